@@ -123,6 +123,40 @@ def behaviour_file(name: str, search: Sequence[str] = ()) -> Path:
     return files[name].parents[1] / "behaviour" / f"{name}.json"
 
 
+def version(name: str, search: Sequence[str] = ()) -> int:
+    """Version of a task: the `VERSION` that the class of its family states in its file, which is not imported; else 1.
+
+    A module that cannot be found is version 1, too: an error tells of it when the task is loaded.
+
+    Raises:
+        UnknownName: there is no such file.
+        BadConfig: the file is not YAML.
+    """
+    module, _, family = str(_head(name, tuple(search)).get("family")).rpartition(".")
+    try:
+        found = find_spec(module)
+    except (ImportError, ValueError):
+        found = None
+    return _stated_version(found.origin, family) if found and found.origin else 1
+
+
+@cache
+def _stated_version(path: str, family: str) -> int:
+    """The `VERSION` of a class in a Python file; 1 if it states none."""
+    text = Path(path).read_text()
+    if "VERSION" not in text:  # parsing takes a hundred times as long
+        return 1
+    classes = [node for node in ast.parse(text).body if isinstance(node, ast.ClassDef) and node.name == family]
+    for line in (line for node in classes for line in node.body):
+        match line:
+            case (
+                ast.AnnAssign(target=ast.Name(id="VERSION"), value=ast.Constant(value=int(stated)))
+                | ast.Assign(targets=[ast.Name(id="VERSION")], value=ast.Constant(value=int(stated)))
+            ):
+                return stated
+    return 1
+
+
 @dataclass(frozen=True)
 class About:
     """Description of a task in its file; fields as in `samplers.task.Task`."""
@@ -173,42 +207,6 @@ def paper_source(name: str, category: str) -> str:
 def category(name: str) -> str:
     """Category of a task, from its file."""
     return str(_head(name).get("category"))
-
-
-def version(name: str, search: Sequence[str] = ()) -> int:
-    """Version of a task that its family declares as `VERSION`, read from the family's file without an import of it.
-
-    Raises:
-        UnknownName: there is no such task file.
-        BadConfig: the file of the family is not found.
-    """
-    module, _, family = str(_head(name, tuple(search)).get("family")).rpartition(".")
-    path = _source(module)
-    if path is None:
-        raise BadConfig(f"{name}.family: there is no module {cut(module)}; give the dotted path of the family")
-    return _declared(path.read_text(), family)
-
-
-def _source(module: str) -> Path | None:
-    """The file of a module; None if there is none. Packages above the module are imported, the module is not."""
-    try:
-        spec = find_spec(module)
-    except (ImportError, ValueError):
-        spec = None
-    return Path(spec.origin) if spec and spec.origin else None
-
-
-def _declared(source: str, family: str) -> int:
-    """The version that a class declares in a source text; 1 if it declares none."""
-    if "VERSION" not in source:  # parsing takes milliseconds, and most families have no second version
-        return 1
-    own = (node for node in ast.parse(source).body if isinstance(node, ast.ClassDef) and node.name == family)
-    lines = [line for node in own for line in node.body if isinstance(line, ast.Assign | ast.AnnAssign)]
-    for line in lines:
-        targets = line.targets if isinstance(line, ast.Assign) else [line.target]
-        if any(isinstance(target, ast.Name) and target.id == "VERSION" for target in targets) and line.value:
-            return int(ast.literal_eval(line.value))
-    return 1
 
 
 def paper_lengths() -> dict[str, float]:

@@ -288,7 +288,8 @@ def _labels(work: Work) -> dict[str, Any]:
     """Columns of a scenario that tables need."""
     row = work.row
     names = ("task", "category", "split", "seed", "index")
-    return {"pool": work.pool, "scenario": row.id, **{name: getattr(row, name) for name in names}}
+    told = {name: getattr(row, name) for name in names}
+    return {"pool": work.pool, "scenario": row.id, **told, "task_version": work.task.version}
 
 
 def prompts(settings: AgentSettings, search: Sequence[str] = ()) -> Iterator[tuple[Work, list[Turn], tuple[int, int]]]:

@@ -104,6 +104,8 @@ class AttackReport:
     """The result of an attack on several scenarios."""
 
     task: str
+    task_version: int
+    """Version of the task."""
     rules: Rules
     """Rules under which the hits reach the goal."""
     scenarios: tuple[str, ...]
@@ -135,6 +137,7 @@ class AttackReport:
         """The report as plain data, without actions, folder and processor time."""
         return {
             "task": self.task,
+            "task_version": self.task_version,
             "rules": self.rules,
             "grammar": GRAMMAR,
             "scenarios": list(self.scenarios),
@@ -194,6 +197,7 @@ def attack(
     budget, rules = max(1, settings.budget // len(subjects)), check_rules(settings.rules)
     identity = {
         "grammar": GRAMMAR,
+        "task_version": task.version,
         "scenarios": [one.scenario.id for one in subjects],
         "budget": budget,
         "seed": settings.seed,
@@ -349,8 +353,9 @@ def _report(
     untried = tuple(UntriedShortcut(**one) for record in records for one in record["untried"])
     cpu = sum(record["cpu"] for record in records)
     lost = tuple(f"{record['scenario']} {record['lost']}" for record in records if record["lost"])
+    told = tuple(_sorted(rates(counts)))
     return AttackReport(
-        task.name, rules, tuple(order), tuple(_sorted(rates(counts))), tuple(hits), priors, untried, lost, folder, cpu
+        task.name, task.version, rules, tuple(order), told, tuple(hits), priors, untried, lost, folder, cpu
     )
 
 

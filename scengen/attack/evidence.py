@@ -24,6 +24,7 @@ from ..pool.untrusted import (
     check_mapping,
     check_match,
     check_text,
+    check_whole,
     demand,
     read_json,
 )
@@ -77,6 +78,8 @@ class Hit:
     """Name of the task; empty for a family that belongs to none."""
     rules: Rules = STRICT
     """Rules under which it reaches the goal."""
+    task_version: int | None = None
+    """Version of the task that was attacked; None in hits of earlier releases, which do not tell it."""
 
     @property
     def refutes(self) -> bool:
@@ -134,7 +137,7 @@ def _plain_hit(about: Any) -> dict[str, Any]:
     Raises:
         ValueError: one of them is missing, unknown, or not what a hit has.
     """
-    about = dict(check_mapping("what it says", about))
+    about = {"task_version": None, **check_mapping("what it says", about)}
     known = [one.name for one in fields(Hit) if one.name != "actions"]
     for name in known:
         demand(name in about, f"it lacks {name}")
@@ -148,6 +151,9 @@ def _plain_hit(about: Any) -> dict[str, Any]:
     check_match("digest", about["digest"], SHORT_HASH)
     check_text("task", about["task"], 100)
     demand(about["rules"] in RULES, "rules are neither strict nor paper")
+    if (version := about["task_version"]) is not None:
+        check_whole("task_version", version)
+        demand(version >= 1, f"task_version is {version}")
     for name, number in check_mapping("params", about["params"]).items():
         demand(_is_number(number), f"params has no number for {cut(name)}")
     lacks, unmoved = about["lacks"], about["unmoved"]
@@ -171,7 +177,8 @@ OTHER_SCENARIO = "the scenario's id does not belong to its parameters; one of a 
 def unsound(hit: Hit, task: Task) -> str:
     """Reason why a stored hit does not hold; empty if it does.
 
-    The scene is built from its parameters, and its actions are replayed.
+    The scene is built from its parameters, and its actions are replayed. The reason names the version of the task on
+    which the hit was found if it is not the installed one.
 
     Raises:
         ScengenError: the parameters are not those of the task.
@@ -181,7 +188,10 @@ def unsound(hit: Hit, task: Task) -> str:
         return OTHER_SCENARIO
     world = world_of(scenario, task.embodiment)
     again = replay(scenario, world, hit.actions, task.horizon, SETTLE_TIME, rules=hit.rules)
-    return "" if again.solved else f"its actions do not reach the goal: {again.reason}"
+    if again.solved:
+        return ""
+    other = task.other_version("found on", hit.task_version)
+    return f"its actions do not reach the goal: {again.reason}{other and f' ({other})'}"
 
 
 class CausalContacts:
@@ -251,6 +261,7 @@ def hit(
         params=values(player.scenario),
         actions=played.actions,
         rules=player.rules,
+        task_version=player.scenario.VERSION,
     )
 
 

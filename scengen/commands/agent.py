@@ -83,7 +83,9 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
     formats = Counter(result["stage"] for result in found.results if result["format_error"])
     for stage, count in sorted(formats.items()):
         say(f"{TITLES[stage]}: {count} replies had no valid form")
-    write_json(str(folder / f"table-{settings.stage}.json"), {"model": settings.model, "stages": told})
+    versions = {result["task"]: result["task_version"] for result in found.results}
+    about = {"model": settings.model, "task_versions": versions, "stages": told}
+    write_json(str(folder / f"table-{settings.stage}.json"), about)
     page = write_page(folder, found.results, settings.model, found.priors)
     say(f"{found.calls} new calls, {found.tokens} tokens; wrote {page} and tables beside it")
     if found.stopped:

@@ -8,7 +8,7 @@ from ..runs.progress import ProgressBar
 from ..settings import at_least
 from ..work.parallel import Workers
 from ..work.targets import try_file
-from . import FAILED, OK, Arguments, err, say, warn
+from . import FAILED, OK, Arguments, err, remark, say, warn
 from .settings import read
 
 
@@ -30,6 +30,8 @@ def command(arguments: Arguments) -> int:
         try_file(str(path))
     edition = Edition.new(path) if settings.write and not path.exists() else Edition.read(settings.edition)
     keys = chosen_sets(settings.tasks)
+    for line in edition.other_versions(keys):
+        remark(line)
     found = _differences(edition, [key for key in keys if key in edition.sets])
     missing = [key for key in keys if key not in edition.sets]
     for key in missing if settings.write else ():

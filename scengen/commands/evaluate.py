@@ -10,7 +10,7 @@ from ..demos.rollouts import Keeper
 from ..evaluate.comparison import MAX_SHOWN, Comparison, PolicyResult
 from ..evaluate.policies import find_policy
 from ..evaluate.rollouts import Evaluation, evaluate
-from ..evaluate.settings import EvaluateSettings
+from ..evaluate.settings import EvaluateSettings, other_version
 from ..pool import Pool
 from ..runs.edition import Edition, check_pool, chosen_sets, evaluation_pools
 from ..runs.progress import ProgressBar
@@ -30,10 +30,12 @@ def command(arguments: Arguments) -> int:
         folders = _edition_pools(settings, settings.edition)
         settings = replace(settings, pool=folders)
         every = settings.several()
-    results = []
+    results, search = [], search_path(arguments)
     for one in every:
+        if told := other_version(one, search):
+            remark(told)
         with ProgressBar(err, f"evaluate {one.name}", 1, one.workers) as progress_bar:
-            results.append(PolicyResult(one, _evaluated(one, progress_bar.of, search_path(arguments))))
+            results.append(PolicyResult(one, _evaluated(one, progress_bar.of, search)))
     compared = Comparison(results)
     _show(compared, settings)
     write(settings.folder / "table.md", compared.markdown)
@@ -50,10 +52,13 @@ def _edition_pools(settings: EvaluateSettings, edition: str) -> list[str]:
     """The pools of an edition: the given ones, which must be its sets, or those of the chosen tasks."""
     found = Edition.read(edition)
     if settings.pool is not None:
-        for folder in settings.folders:
-            check_pool(found, Pool.open(folder).check())
+        keys = [check_pool(found, Pool.open(folder).check()) for folder in settings.folders]
+    else:
+        keys = chosen_sets(settings.tasks) if settings.tasks else list(found.sets)
+    for line in found.other_versions(keys):
+        remark(line)
+    if settings.pool is not None:
         return settings.folders
-    keys = chosen_sets(settings.tasks) if settings.tasks else list(found.sets)
     with ProgressBar(err, f"edition {found.name}", found.n, settings.workers) as progress_bar:
         return evaluation_pools(
             found, keys, settings.workers, lambda key, done, total: progress_bar.of(done, total, f"certify {key}")

@@ -25,7 +25,7 @@ from ..validate.playable import check_row
 from ..validate.rebuilt import rebuild
 from ..validate.stored import task_of_manifest
 from ..work.targets import try_file
-from . import OK, Arguments, chosen, err, holder, misnaming_remarked, say, several, write
+from . import OK, Arguments, chosen, err, holder, misnaming_remarked, remark, say, several, write
 from .settings import read
 
 MAX_STRIP_PIXELS = 100_000_000
@@ -157,4 +157,6 @@ def _take_of_hit(settings: FilmSettings, arguments: Arguments) -> Take:
     if scenario.id != hit.scenario:
         raise BadConfig(f"hit = {settings.hit}: {OTHER_SCENARIO}")
     say(str(hit))
+    if other := task.other_version("found on", hit.task_version):
+        remark(f"hit = {settings.hit}: {other}")
     return Take(scenario, rebuild(scenario), task.embodiment, hit.actions)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from rich.table import Table
 
+from ..compose import load_task
 from ..errors import BadConfig, cut
 from ..export.recording import RecordSettings, record
 from ..learn.data import TrainingData
@@ -11,7 +12,7 @@ from ..learn.train import Trained, TrainSettings, train
 from ..pool.demonstrations import is_demonstrations
 from ..pool.manifest import MANIFEST
 from ..runs.progress import ProgressBar
-from ..task_files import search_path
+from ..task_files import search_path, tasks
 from . import OK, Arguments, err, out, remark, say
 from .settings import read
 
@@ -27,6 +28,10 @@ def command(arguments: Arguments) -> int:
     left_out = ", ".join(f"{count} {why}" for why, count in data.left_out.items() if count)
     if left_out:
         remark(f"episodes that are not learned from: {left_out}")
+    search = search_path(arguments)
+    if data.task in tasks(search):
+        if told := load_task(data.task, search).other_version("recorded with", data.task_version):
+            remark(f"{recording} was {told}")
     with ProgressBar(err, f"train {settings.policy}", settings.epochs) as progress_bar:
         trained = train(settings, data, lambda done, total, told: progress_bar.of(done, total, told))
     if not trained.losses:

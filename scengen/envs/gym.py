@@ -1,12 +1,14 @@
-"""Gymnasium environments over pools: `gymnasium.make("scengen/domino_single-v0", pool="generated/id")`.
+"""Gymnasium environments over pools: `gymnasium.make("scengen/domino_single-v1", pool="generated/id")`.
 
-Importing this module registers every task. `gymnasium.make("scengen.envs.gym:scengen/...")` imports it by itself.
+Importing this module registers every task. `gymnasium.make("scengen.envs.gym:scengen/...")` imports it by itself. The
+number in an id is the version of the task (`Scenario.VERSION`). `-v0` names the installed version, too, with a warning.
 An environment plays the certified scenarios of a pool, with the scene text, the physics and the controller of the
 certificate. Reset samples nothing: the seed selects one of the stored scenarios, and `info` holds its id.
 """
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,7 +22,7 @@ from .. import compose, task_files
 from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import STRICT, Actions, Episode, Outcome, Rules, check_rules
-from ..errors import BadConfig, UnknownName, Unstable, cut
+from ..errors import BadConfig, ScengenError, UnknownName, Unstable, cut
 from ..orientation import Orientation
 from ..params import Value
 from ..pictures.opengl import check_size
@@ -488,10 +490,26 @@ def clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) ->
     return np.minimum(np.maximum(reading, -bound), bound).astype(np.float32)  # a fifth of the time of `clip`
 
 
+def _installed(task: str) -> int:
+    """Version of a task; 1 if its file cannot be read, of which an error tells when the task is loaded."""
+    with suppress(ScengenError):
+        return task_files.version(task)
+    return 1
+
+
+def register(task: str) -> None:
+    """Register a task with Gymnasium: under its version, and as `-v0`, the name of all tasks before they had versions.
+
+    Gymnasium itself warns of `-v0`, and refuses other versions with a line that names those that there are.
+    """
+    for version in (0, _installed(task)):
+        gymnasium.register(
+            f"scengen/{task}-v{version}",
+            "scengen.envs.gym:PoolEnv",
+            vector_entry_point="scengen.envs.vector:PoolVectorEnv",
+            kwargs={"task": task},
+        )
+
+
 for _name in task_files.tasks():
-    gymnasium.register(
-        f"scengen/{_name}-v0",
-        "scengen.envs.gym:PoolEnv",
-        vector_entry_point="scengen.envs.vector:PoolVectorEnv",
-        kwargs={"task": _name},
-    )
+    register(_name)

@@ -47,6 +47,11 @@ class PolicyResult:
         """The lines of its table."""
         return table(self.evaluation.episodes)
 
+    @property
+    def task_versions(self) -> dict[str, int]:
+        """Versions of the tasks that were played, by task."""
+        return {e["task"]: e["task_version"] for e in self.evaluation.episodes}
+
     @cached_property
     def failures(self) -> list[Failure]:
         """Its failures, the most frequent first."""
@@ -78,6 +83,7 @@ class PolicyResult:
             "version": settings.version,
             "rules": settings.rules,
             "splits": settings.splits,
+            "task_versions": self.task_versions,
             "edition": settings.edition and edition_told(settings.edition),
             "settle": settings.settle,
             "headline": self.headline,
@@ -152,6 +158,8 @@ class Comparison:
             parts.append("\n".join(f"* {_escaped(line)}" for line in self.headlines))
         if rows := list(self.failure_rows()):
             parts.append(_table(self.failure_head, rows))
+        versions = {task: version for result in self.results for task, version in result.task_versions.items()}
+        parts.append("Versions of the tasks: " + ", ".join(f"{task} {each}" for task, each in versions.items()) + ".")
         return "\n\n".join(parts) + "\n"
 
     def _if_several(self, cell: str) -> list[str]:

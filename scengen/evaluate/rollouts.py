@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ..compose import load_task
 from ..episode import Actions
 from ..errors import BadConfig, PoolError
 from ..pool import Pool
@@ -71,7 +72,8 @@ def evaluate(
         raise BadConfig(f"{why}; say fresh=true to begin anew, or version=NAME from the start to be able to continue")
     remedy = "say fresh=true to begin anew (old episodes are moved aside), or choose another to="
     with closing(PolicyPlayer(settings, search)) as player:
-        depends = {**_identity(settings, pools), "code": player.identities({a["task"] for a in about.values()})}
+        versions = {a["task"]: a["task_version"] for a in about.values()}
+        depends = {**_identity(settings, pools), "task_versions": versions, "code": player.identities({*versions})}
         if settings.fresh:
             _move_aside(path)
         with Log(path, depends, remedy) as log:
@@ -83,7 +85,7 @@ def evaluate(
                 played, task = episode.pop("played", None), about[episode["pool"], episode["scenario"]]["task"]
                 if played is not None:
                     keep(_id({"task": task, **episode}), played)
-                log.add({"task": task, **episode})
+                log.add({"task": task, "task_version": versions[task], **episode})
                 progress(count, len(wanted))
             records = log.records
     episodes = sorted(
@@ -158,6 +160,8 @@ def _first_scenarios(pool: Pool, settings: EvaluateSettings, search: Sequence[st
     every: list[tuple[str, dict[str, Any]]] = [
         (id_, dict(zip(names, told, strict=True))) for id_, *told in pool.columns("id", *names)
     ]
+    versions = {name: load_task(name, search).version for name in {told["task"] for _, told in every}}
+    every = [(id_, {**told, "task_version": versions[told["task"]]}) for id_, told in every]
     wanted = [(id_, told) for id_, told in every if _is_wanted(told["task"], told["split"], settings.splits, search)]
     if wanted and len(wanted) < settings.seeds:
         remedy = f"say seeds={len(wanted)}"

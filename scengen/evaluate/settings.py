@@ -1,10 +1,12 @@
 """Settings of an evaluation."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
+from ..compose import load_task
 from ..control.teleop import check_filter
 from ..envs.vector import MAX_SLOTS
 from ..episode import STRICT, check_rules
@@ -155,6 +157,18 @@ def completed(settings: EvaluateSettings) -> EvaluateSettings:
     own = read_settings(settings.name)
     repeat = own.action_repeat if settings.action_repeat == 1 else settings.action_repeat
     return replace(settings, observations=settings.observations or list(own.observed), action_repeat=repeat)
+
+
+def other_version(settings: EvaluateSettings, search: Sequence[str] = ()) -> str:
+    """A line about a policy that was trained on another version of its task than the installed one; empty for others.
+
+    Args:
+        search: overrides that add folders of other packages, see `task_files.search_path`.
+    """
+    if not is_policy(settings.name):
+        return ""
+    own = read_settings(settings.name)
+    return load_task(own.task, search).other_version(f"{settings.name} was trained on", own.task_version)
 
 
 def _folder_name(policy: str) -> str:

@@ -24,6 +24,8 @@ from ..pool.untrusted import READING_MEMORY
 from ..work.machine import memory_bounded
 from .lerobot import VIDEO_PATH
 
+TASK_VERSION = "scengen/task_version"
+"""Column of the table of episodes with the version of the task. Recordings of earlier releases lack it."""
 MAX_FRAMES = 200_000
 """Largest number of rows of an episode that is read."""
 MAX_ROWS = 50_000_000

@@ -45,6 +45,9 @@ def card(info: Mapping[str, Any], instructions: Iterable[str], source: Mapping[s
         "* `scengen/...` columns of the table of episodes name scenario, parameters, seed and index of each episode; "
         "`scengen/absent` lists bodies of `observation.environment_state` that the scene lacks, whose entries read 0.",
     ]
+    if made := source.get("task_versions"):
+        told = ", ".join(f"{name} {version}" for name, version in made.items())
+        lines.append(f"* Versions of the tasks: {told}. The column `scengen/task_version` has that of each episode.")
     if styles := source.get("styles"):
         told = ", ".join(f"{count} {style}" for style, count in sorted(styles.items()))
         lines.append(f"* Styles: {told}. The column `scengen/style` names the style of each episode.")

@@ -38,6 +38,7 @@ from ..versions import versions
 from ..work.parallel import Workers
 from ..work.targets import appearing, check_unfinished, try_file, try_folder
 from .cameras import calibration
+from .dataset import TASK_VERSION
 from .hdf5 import check_target
 from .lerobot import DatasetWriter, Feature
 from .native import FULL_RATE, NativeWriter
@@ -200,6 +201,7 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                     styles[row.style] += 1
                 progress(writer.episodes, count)
             source = {"pools": [pool.sha256 for pool in pools], "versions": versions()}
+            source["task_versions"] = {name: task.version for name, task in tasks.items()}
             writer.finish({**source, "styles": dict(styles)} if styles else source)
     return RecordSummary(writer.episodes, writer.rows, tuple(failed), left_out)
 
@@ -286,6 +288,7 @@ class _LeRobotWriter(DatasetWriter):
         further = DEMONSTRATION_COLUMNS if isinstance(row, DemonstrationRow) else ()
         columns |= origin
         told = {f"scengen/{name}": columns[name] for name in (*EPISODE_COLUMNS, *further, *origin)}
+        told[TASK_VERSION] = replay.scenario.VERSION
         model = replay.world.model
         present = {model.body(i).name for i in range(model.nbody)}
         absent = ",".join(body for body in self._bodies if body not in present)

@@ -115,6 +115,7 @@ class Demonstrations:
             "scenario": row.id,
             "lang": row.instruction,
             "task": row.task,
+            "task_version": replay.scenario.VERSION,
             "split": row.split,
             "success": success,
         }

@@ -13,7 +13,7 @@ from ..control.loop import ACTION, Loop
 from ..envs.object_state import NAME
 from ..envs.observations import proprioception
 from ..errors import BadConfig, PoolError, UnknownName, cut
-from ..export.dataset import EpisodeData, Recording
+from ..export.dataset import TASK_VERSION, EpisodeData, Recording
 from ..export.streams import ENVIRONMENT
 from ..pool.files import read_json_file, sha256, sha256_of_file
 from .goals import pose_streams
@@ -43,6 +43,8 @@ class TrainingData:
     """Demonstrations of one task."""
 
     task: str
+    task_version: int | None
+    """Version of the task; None in recordings that do not tell it."""
     embodiment: str
     rate: int
     """Rows per second, a divisor of 100."""
@@ -102,7 +104,8 @@ class TrainingData:
         found = found[:demonstrations]
         entries = tuple(name for names in columns.values() for name in names)
         identity = [*_hashes(recording), json.dumps([trajectory.scenario for trajectory in found])]
-        return cls(task, robot, _rate(recording), streams, entries, tuple(found), sha256("\n".join(identity)), left_out)
+        version, rate, hashed = _task_version(recording, task), _rate(recording), sha256("\n".join(identity))
+        return cls(task, version, robot, rate, streams, entries, tuple(found), hashed, left_out)
 
     @property
     def rows(self) -> int:
@@ -131,6 +134,18 @@ def _task(recording: Recording, asked: str | None) -> str:
     if asked is None and len(tasks) > 1:
         raise BadConfig(f"{recording.folder} holds demonstrations of {' and '.join(tasks)}; say task=...")
     return asked or tasks[0]
+
+
+def _task_version(recording: Recording, task: str) -> int | None:
+    """The version of the task of which a recording is; None if its episodes do not tell it.
+
+    Raises:
+        PoolError: the episodes tell several versions, or something else.
+    """
+    first, *others = (row.get(TASK_VERSION) for row in recording.episodes if row["scengen/task"] == task)
+    if all(other == first for other in others) and (first is None or (isinstance(first, int) and first >= 1)):
+        return first
+    raise PoolError(f"{recording.folder}: {TASK_VERSION} of {task} is not one number; record one version alone")
 
 
 def _columns(recording: Recording, streams: Sequence[str]) -> dict[str, tuple[str, ...]]:

@@ -35,7 +35,7 @@ WEIGHTS = "weights.npz"
 """File with the arrays of a policy."""
 LOSS = "loss.svg"
 """File with a plot of the losses."""
-FORMAT = 3
+FORMAT = 4
 """Version of the format."""
 MAX_ENTRIES = 100_000
 """Largest number of entries of an observation."""
@@ -66,6 +66,8 @@ class PolicySettings:
     kind: str
     """Name of the policy, one of `models.KINDS`."""
     task: str
+    task_version: int | None
+    """Version of the task; None if the recording did not tell it."""
     embodiment: str
     rate: int
     """Actions per second, a divisor of 100."""
@@ -131,6 +133,7 @@ class PolicySettings:
         if self.kind not in KINDS:
             raise UnknownName("policy", self.kind, KINDS)
         check_match("task", self.task, WORD)
+        demand(self.task_version is None or self.task_version >= 1, f"task_version is {self.task_version}")
         if self.embodiment not in EMBODIMENTS:
             raise UnknownName("embodiment", self.embodiment, EMBODIMENTS)
         full = round(1 / Loop.PERIOD)

@@ -120,6 +120,7 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
         own = PolicySettings(
             kind=settings.policy,
             task=data.task,
+            task_version=data.task_version,
             embodiment=data.embodiment,
             rate=data.rate,
             streams=data.streams,
@@ -152,7 +153,7 @@ def _identity(settings: TrainSettings, data: TrainingData) -> str:
     """Hash of everything that decides the weights."""
     chosen = {name: value for name, value in asdict(settings).items() if name not in GIVEN_BY_DATA}
     versions = {"format": FORMAT, "version": _version("scengen")}
-    told = {**chosen, "sha256": data.sha256, "streams": data.streams, **versions}
+    told = {**chosen, "sha256": data.sha256, "task_version": data.task_version, "streams": data.streams, **versions}
     return sha256(json.dumps(told, sort_keys=True))
 
 

@@ -28,7 +28,7 @@ from ..work.parallel import Workers
 from ..work.targets import write
 from .generate import GenerateSettings, generate
 
-FORMAT = 1
+FORMAT = 2
 """Format of the file."""
 SCENARIOS = 20
 """Number of scenarios of each set of a new edition, as in the paper's evaluation."""
@@ -42,6 +42,7 @@ FOLDER = Path("generated/editions")
 LINE = re.compile(r"(0|[1-9][0-9]{0,8}) ([0-9a-f]{12}) ([0-9a-f]{64})")
 """A scenario in the file: its index, its id, and the hash of its scene (`portable_sha256`)."""
 HEAD = """# Frozen evaluation scenarios, written by `scengen edition write=true`. A set that is released never changes.
+# task_versions: version of each task when its first set was frozen.
 # sets: <task>/<split>: lines of index, id, and hash of the scene, whose numbers are rounded to 9 digits. They are the
 # first n indices of the seed that were certified at this level by these versions.
 """
@@ -83,6 +84,7 @@ class EditionFile:
     n: int
     level: str
     made_with: Mapping[str, str]
+    task_versions: Mapping[str, int]
     sets: Mapping[str, list[str]]
 
 
@@ -102,6 +104,8 @@ class Edition:
     """Level of the certificates."""
     made_with: Mapping[str, str]
     """Versions with which the first set was certified."""
+    task_versions: Mapping[str, int]
+    """Version of each task of which the edition has a set."""
     sets: Mapping[str, tuple[Frozen, ...]]
     """Scenarios of each set, by `<task>/<split>`."""
 
@@ -109,7 +113,7 @@ class Edition:
     def new(cls, path: Path) -> "Edition":
         """An edition without sets."""
         made_with = {name: version for name, version in versions().items() if name != "platform"}
-        return cls(path.stem, path, SEED, SCENARIOS, LEVEL, made_with, {})
+        return cls(path.stem, path, SEED, SCENARIOS, LEVEL, made_with, {}, {})
 
     @classmethod
     def read(cls, name: str) -> "Edition":
@@ -128,26 +132,31 @@ class Edition:
             raise BadConfig(f"edition = {path}; it is not YAML ({cut(' '.join(str(error).split()))})") from None
         if not isinstance(node, Mapping) or not all(isinstance(key, str) for key in node):
             raise BadConfig(f"edition = {path}; it must be a group of settings, as scengen edition writes it")
+        if (given := node.get("format")) != FORMAT:
+            given = cut(repr(given), 20)
+            raise BadConfig(f"{path} has format {given}; this version reads format {FORMAT}; install another one")
         told = typed(str(path), EditionFile, node, exact=True)
-        if told.format != FORMAT:
-            raise BadConfig(f"{path} has format {told.format}; this version reads format {FORMAT}; install another one")
         sets = {key: tuple(Frozen.parse(line, f"{path}, {key}") for line in lines) for key, lines in told.sets.items()}
         for key, scenarios in sets.items():
             indices = [scenario.index for scenario in scenarios]
             if len(indices) != told.n or sorted(set(indices)) != indices or key.count("/") != 1:
                 raise BadConfig(f"{path}: set {cut(key)} must have {told.n} scenarios with rising indices")
-        return cls(path.stem, path, told.seed, told.n, told.level, told.made_with, sets)
+        if {split_of(key)[0] for key in sets} != told.task_versions.keys():
+            raise BadConfig(f"{path}: task_versions must have the tasks of the sets, and no others")
+        return cls(path.stem, path, told.seed, told.n, told.level, told.made_with, told.task_versions, sets)
 
     @property
     def text(self) -> str:
         """The text of the file."""
         head = f"format: {FORMAT}\nseed: {self.seed}\nn: {self.n}\nlevel: {self.level}\nmade_with:\n"
         made = "".join(f"  {name}: '{version}'\n" for name, version in self.made_with.items())
+        told = "".join(f"  {task}: {version}\n" for task, version in sorted(self.task_versions.items()))
+        versions = f"task_versions:\n{told}" if told else "task_versions: {}\n"
         order = {key: number for number, key in enumerate(wanted_sets())}
         lines = ["sets:\n" if self.sets else "sets: {}\n"]
         for key in sorted(self.sets, key=lambda key: (order.get(key, len(order)), key)):
             lines += [f"  {key}:\n", *(f"  - {scenario}\n" for scenario in self.sets[key])]
-        return HEAD + head + made + "".join(lines)
+        return HEAD + head + made + versions + "".join(lines)
 
     @property
     def sha256(self) -> str:
@@ -169,8 +178,26 @@ class Edition:
         return FOLDER / self.name / key.replace("/", "-")
 
     def with_set(self, key: str, pool: Pool) -> "Edition":
-        """The edition with one more set, that of a finished pool."""
-        return replace(self, sets={**self.sets, key: tuple(frozen(pool))})
+        """The edition with one more set, that of a finished pool.
+
+        Raises:
+            BadConfig: its sets of the same task are of another version.
+        """
+        task = load_task(split_of(key)[0])
+        for other in self.other_versions(there for there in self.sets if split_of(there)[0] == task.name):
+            raise BadConfig(f"{other}; a task has one version in an edition: write another one")
+        task_versions = {**self.task_versions, task.name: task.version}
+        return replace(self, task_versions=task_versions, sets={**self.sets, key: tuple(frozen(pool))})
+
+    def other_versions(self, keys: Iterable[str]) -> Iterator[str]:
+        """A line for each task of some sets that was frozen at another version than the installed one.
+
+        Raises:
+            UnknownName: there is no such task.
+        """
+        for name in dict.fromkeys(split_of(key)[0] for key in keys if key in self.sets):
+            if other := load_task(name).other_version("frozen at", self.task_versions[name]):
+                yield f"edition {self.name} is {other}"
 
     def save(self) -> None:
         """Write the file.

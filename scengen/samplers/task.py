@@ -107,6 +107,18 @@ class Task:
         """Version of the task, that of its family."""
         return self.family.VERSION
 
+    def other_version(self, made: str, version: int | None) -> str:
+        """A line about something that was made for another version of the task; empty if it was made for this one.
+
+        Args:
+            made: what happened to it, such as "trained on".
+            version: version of the task for which it was made; None if it is unknown.
+        """
+        if version == self.version:
+            return ""
+        told = "an unknown version" if version is None else f"version {version}"
+        return f"{made} {told} of {self.name}; installed: {self.version}"
+
     @cached_property
     def nominal(self) -> Scenario:
         """The family with its nominal parameters, and with scans instead of proxies."""

@@ -12,6 +12,7 @@ from scengen.agents.replies import FormatError, read_json
 from scengen.agents.runner import AgentSettings, run
 from scengen.agents.tables import by_question, lost_in_twins
 from scengen.errors import ScengenError
+from scengen.tasks.domino_single import DominoSingle
 
 REFERENCE = str(helpers.REFERENCE)
 
@@ -39,6 +40,15 @@ def test_stand_ins_get_what_they_must(tmp_path, model, right, forms):
     assert sum(bool(plain["format_error"]) for plain in found.results) == forms
     grades = {grade for line in by_question(found.results, found.priors) for grade in line.counts}
     assert grades <= {"facts": {"right"}, "wrong": {"wrong", "forbidden"}}.get(model, {"format"})
+
+
+def test_results_name_the_version_of_their_task(tmp_path, monkeypatch):
+    monkeypatch.setattr(DominoSingle, "VERSION", 2)
+    argv = ["agent", "model=silent", f"pool={REFERENCE}", "seeds=1", "pictures=false", f"to={tmp_path}"]
+    assert cli.run(argv) == 0
+    (line,) = (tmp_path / "results-1.jsonl").read_text().splitlines()
+    assert json.loads(line)["task_version"] == 2
+    assert json.loads((tmp_path / "table-1.json").read_text())["task_versions"] == {"domino_single": 2}
 
 
 def runner_outcomes(plain):

@@ -13,7 +13,7 @@ import pytest
 from scengen import cli, load_task
 from scengen.attack.campaign import drawn
 from scengen.attack.check import attacked
-from scengen.attack.evidence import Hit
+from scengen.attack.evidence import Hit, unsound
 from scengen.errors import BadConfig
 from scengen.pool import Pool
 from scengen.pool.files import sha256
@@ -108,6 +108,7 @@ CHANGES = {
     "bodies are numbers": {"unmoved": [3]},
     "one more": {"more": 1},
     "a task that is a list": {"task": []},
+    "version 0": {"task_version": 0},
 }
 
 
@@ -121,6 +122,22 @@ def test_what_a_hit_says_is_checked_before_it_is_used(attacked_pool, tmp_path, c
     argv = command.format(hit=tmp_path / "hit.npz", to=tmp_path / "strip.png").split()
     assert cli.run(argv) == 2
     assert "is not a hit of scengen attack, or is damaged: " in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_a_hit_of_another_version_is_told_of(attacked_pool, tmp_path, capsys, monkeypatch):
+    whole = next((attacked_pool / "hits").iterdir())
+    hit = Hit.load(whole)
+    assert hit.task_version == 1 and Pool.open(attacked_pool).manifest.attack["task_version"] == 1
+    assert unsound(hit, TASK) == ""
+    monkeypatch.setattr(TASK.family, "VERSION", 2)
+    assert unsound(hit, TASK) == "", "a hit that still replays holds"
+    told = unsound(replace(hit, actions=hit.actions[:-300] * 0), TASK)
+    assert told.endswith("(found on version 1 of domino_single; installed: 2)")
+    with np.load(whole) as stored:  # as earlier releases wrote it
+        about = json.loads(str(stored["about"]))
+        del about["task_version"]
+        np.savez_compressed(tmp_path / "hit.npz", actions=stored["actions"], about=json.dumps(about))
+    assert Hit.load(tmp_path / "hit.npz").task_version is None
 
 
 @pytest.mark.parametrize("command", ["verify hits={hit}", "film hit={hit} to={to}"])

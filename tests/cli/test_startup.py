@@ -33,7 +33,7 @@ def test_a_task_is_told_of_as_it_is_loaded(name):
     about, task = task_files.about(name), load_task(name)
     for key in ("name", "code", "category", "instruction", "embodiment"):
         assert getattr(about, key) == getattr(task, key)
-    assert about.axes == tuple(task.axes)
+    assert about.axes == tuple(task.axes) and task_files.version(name) == task.version
     assert about.paper_axes == tuple(axis.name for axis in task.axes.values() if task.of_paper(axis))
 
 

@@ -11,10 +11,10 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from helpers import REFERENCE, pictures_are_possible
 
-from scengen import list_tasks, load_task
+from scengen import list_tasks, load_task, task_files
 from scengen.control.teleop import LARGEST_CHANGE
 from scengen.envs import observations
-from scengen.envs.gym import PoolEnv
+from scengen.envs.gym import PoolEnv, register
 from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.pool import Pool
 from scengen.sim.arm import IDLE
@@ -24,7 +24,7 @@ EVERYTHING = (*observations.streams_of("panda_jaw"),)
 
 @pytest.fixture
 def env():
-    with gymnasium.make("scengen/domino_single-v0", pool=REFERENCE) as made:
+    with gymnasium.make("scengen/domino_single-v1", pool=REFERENCE) as made:
         yield made
 
 
@@ -40,7 +40,56 @@ def test_gymnasiums_own_checker_has_nothing_to_say():
 
 
 def test_every_task_is_registered():
-    assert {f"scengen/{name}-v0" for name in list_tasks()} <= set(gymnasium.registry)
+    versions = {name: load_task(name).version for name in list_tasks()}
+    assert {f"scengen/{name}-v{version}" for name, version in versions.items()} <= set(gymnasium.registry)
+
+
+def test_the_version_of_a_task_is_read_without_its_family(tmp_path, monkeypatch):
+    """Version 2 of a family of one's own, which raises if it is imported, and classes that are not the family."""
+    (tmp_path / "task").mkdir()
+    (tmp_path / "task" / "mine.yaml").write_text("family: mine_at_two.Mine\n")
+    (tmp_path / "task" / "other.yaml").write_text("family: mine_at_two.Other\n")
+    (tmp_path / "task" / "gone.yaml").write_text("family: no_such_package.tasks.Mine\n")
+    code = "raise ImportError\nclass Mine:\n    VERSION: ClassVar[int] = 2\nclass Other:\n    HOLD = 2\n"
+    (tmp_path / "mine_at_two.py").write_text(code)
+    monkeypatch.syspath_prepend(tmp_path)
+    search = [f"hydra.searchpath=[file://{tmp_path}]"]
+    assert [task_files.version(name, search) for name in ("mine", "other", "gone")] == [2, 1, 1]
+
+
+@pytest.fixture
+def registry(monkeypatch):
+    """A copy of Gymnasium's registry, to register in."""
+    copied = dict(gymnasium.registry)
+    monkeypatch.setattr("gymnasium.envs.registration.registry", copied)
+    return copied
+
+
+def test_ids_have_the_installed_version_and_others_are_one_line(registry, monkeypatch):
+    monkeypatch.setattr(task_files, "version", lambda name: 2)
+    for name in [name for name in registry if name.startswith("scengen/domino_single-v")]:
+        registry.pop(name)
+    register("domino_single")
+    assert gymnasium.spec("scengen/domino_single-v2").kwargs == {"task": "domino_single"}
+    with pytest.raises(gymnasium.error.DeprecatedEnv, match="Please use `scengen/domino_single-v2`") as raised:
+        gymnasium.spec("scengen/domino_single-v1")
+    assert "\n" not in str(raised.value)
+    with pytest.raises(gymnasium.error.VersionNotFound, match="`v7` .* provides versioned .* `v2` ]") as raised:
+        gymnasium.spec("scengen/domino_single-v7")
+    assert "\n" not in str(raised.value)
+
+
+def test_v0_is_the_installed_version_with_a_warning():
+    with pytest.warns(DeprecationWarning, match="scengen/domino_single-v0 is out of date.*`v1`") as told:
+        made = gymnasium.make("scengen/domino_single-v0", pool=REFERENCE)
+    assert len(told) == 1 and isinstance(made.unwrapped, PoolEnv)
+
+
+def test_a_task_file_that_cannot_be_read_is_registered_all_the_same(registry, monkeypatch):
+    monkeypatch.setattr(task_files, "version", mock.Mock(side_effect=BadConfig("it is not YAML")))
+    registry.pop("scengen/packing-v0"), registry.pop("scengen/packing-v1")
+    register("packing")
+    assert "scengen/packing-v1" in registry
 
 
 def test_witnesses_reach_the_goal_and_end_in_the_certified_seconds(env):
@@ -75,7 +124,7 @@ def test_a_step_before_the_first_reset_is_refused():
 
 
 def test_a_specification_with_a_path_is_json():
-    made = gymnasium.make("scengen/domino_single-v0", pool=REFERENCE)
+    made = gymnasium.make("scengen/domino_single-v1", pool=REFERENCE)
     assert str(REFERENCE) in made.spec.to_json()
 
 
@@ -192,7 +241,7 @@ def test_what_is_no_action_never_reaches_the_simulator(env, action):
         (lambda: PoolEnv("domino_select", REFERENCE), PoolError, "of domino_single, not of domino_select"),
         (lambda: PoolEnv("domino_single", "nowhere"), PoolError, "no pool at nowhere"),
         (lambda: PoolEnv("domino_single", []), PoolError, "no pool was given; give pool=FOLDER"),
-        (lambda: gymnasium.make("scengen/domino_single-v0"), PoolError, "no pool was given; give pool=FOLDER"),
+        (lambda: gymnasium.make("scengen/domino_single-v1"), PoolError, "no pool was given; give pool=FOLDER"),
         (lambda: PoolEnv("domino_single", REFERENCE, split="idd"), UnknownName, "no split in these pools named 'idd'"),
         (
             lambda: PoolEnv("domino_single", REFERENCE, scenario="z"),
@@ -277,7 +326,7 @@ def test_the_fingers_feel_what_they_press_and_nothing_else():
 
 
 def test_vectors_of_environments_step_together():
-    envs = gymnasium.make_vec("scengen/domino_single-v0", num_envs=2, vectorization_mode="sync", pool=REFERENCE)
+    envs = gymnasium.make_vec("scengen/domino_single-v1", num_envs=2, vectorization_mode="sync", pool=REFERENCE)
     _, info = envs.reset(seed=[1, 3], options={"labels": True})
     assert info["scenario"][0] != info["scenario"][1]
     seen, reward, *_ = envs.step(np.zeros((2, 7), np.float32))

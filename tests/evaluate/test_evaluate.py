@@ -87,6 +87,19 @@ def test_a_run_cut_short_goes_on_where_it_was(tmp_path):
     assert log.read_text().startswith(kept) and len(log.read_text().splitlines()) == 1 + 3
 
 
+@pytest.mark.usefixtures("brief")
+def test_results_name_the_versions_of_their_tasks_and_versions_are_not_mixed(tmp_path, monkeypatch):
+    argv = ["evaluate", "policy=idle", f"pool={REFERENCE}", "seeds=1", "rollouts=1", f"to={tmp_path}"]
+    assert cli.run(argv) == 0
+    monkeypatch.setattr(DominoSingle, "VERSION", 2)
+    assert cli.run(argv) == 2, "episodes of version 1 are not continued"
+    assert cli.run([*argv, "fresh=true"]) == 0
+    identity, record = map(json.loads, (tmp_path / "episodes.jsonl").read_text().splitlines())
+    assert identity["task_versions"] == {"domino_single": 2} and record["task_version"] == 2
+    assert json.loads((tmp_path / "table.json").read_text())["task_versions"] == {"domino_single": 2}
+    assert "Versions of the tasks: domino_single 2." in (tmp_path / "table.md").read_text()
+
+
 def test_the_table_pairs_each_split_with_training(tmp_path):
     def episode(task, split, scenario, success):
         return {

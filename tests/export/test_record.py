@@ -29,6 +29,7 @@ from scengen.pool.writing import write_pool
 from scengen.sim.arm import IDLE
 from scengen.sim.embodiment import SUCTION
 from scengen.sim.world import World
+from scengen.tasks.domino_single import DominoSingle
 
 PAPER = {
     "robot0_eef_pos": (3,),
@@ -149,6 +150,14 @@ def test_episodes_name_their_scenario_and_nothing_else_does(made, witnesses):
     tasks = pq.read_table(made / "meta" / "tasks.parquet")
     assert tasks.to_pylist() == [{"task_index": 0, "task": witnesses[0].instruction}]
     assert json.loads(tasks.schema.metadata[b"pandas"])["index_columns"] == ["task"]
+
+
+def test_a_recording_names_the_version_of_its_task(tmp_path, monkeypatch):
+    monkeypatch.setattr(DominoSingle, "VERSION", 2)
+    recorded(tmp_path / "made", n=1)
+    assert [episode["scengen/task_version"] for episode in episodes_of(tmp_path / "made")] == [2]
+    assert read_json(tmp_path / "made", "scengen.json")["task_versions"] == {"domino_single": 2}
+    assert "Versions of the tasks: domino_single 2" in (tmp_path / "made" / "README.md").read_text()
 
 
 def test_the_actions_are_the_witness_bit_by_bit(made, witnesses):

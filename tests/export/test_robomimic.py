@@ -55,6 +55,11 @@ def test_a_loader_finds_every_demonstration_with_all_its_parts(made, witnesses):
         assert not group["rewards"][:-1].any() and group["rewards"][-1] == group["dones"][-1] == 1
 
 
+def test_the_file_names_the_version_of_its_task(made):
+    assert json.loads(made["data"].attrs["scengen"])["task_versions"] == {"domino_single": 1}
+    assert [json.loads(demo.attrs["ep_meta"])["task_version"] for demo in made["data"].values()] == [1, 1]
+
+
 def test_filter_keys_name_splits_and_successes(made):
     assert {name: [demo.decode() for demo in made[f"mask/{name}"]] for name in made["mask"]} == {
         "id": ["demo_0", "demo_1"],

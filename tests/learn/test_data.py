@@ -105,6 +105,29 @@ def test_of_several_tasks_one_is_chosen(mine):
         TrainingData.read(mine, task="packin")
 
 
+@pytest.mark.parametrize("told", [[1, 2, 1], [1, None, 1], [0, 0, 0], ["1", "1", "1"]])
+def test_a_recording_has_one_version_of_its_task(mine, told):
+    assert TrainingData.read(mine).task_version == 1
+    rewrite_versions(mine, told)
+    with pytest.raises(PoolError, match="scengen/task_version of domino_single is not one number"):
+        TrainingData.read(mine)
+
+
+def test_a_recording_of_an_earlier_release_has_an_unknown_version(mine, tmp_path, capsys):
+    rewrite_versions(mine, None)
+    assert TrainingData.read(mine).task_version is None
+    assert cli.run(["train", "policy=knn", f"data={mine}", f"to={tmp_path / 'policy'}"]) == 0
+    assert "recorded with an unknown version of domino_single; installed: 1" in capsys.readouterr().err
+    assert json.loads((tmp_path / "policy" / "policy.json").read_text())["task_version"] is None
+
+
+def rewrite_versions(folder, told):
+    """Other values in the column of versions, or no such column."""
+    path = folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet"
+    table = pq.read_table(path).drop_columns(["scengen/task_version"])
+    pq.write_table(table if told is None else table.append_column("scengen/task_version", [told]), path)
+
+
 def test_streams_that_were_not_recorded_are_refused(mine):
     with pytest.raises(UnknownName, match=r"no recorded stream named 'robot0_eef_poz' \(did you mean 'robot0_eef_pos'"):
         TrainingData.read(mine, ["robot0_eef_poz"])

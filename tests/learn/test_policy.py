@@ -16,12 +16,13 @@ from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig, PoolError
 from scengen.evaluate.policies import find_policy
 from scengen.evaluate.rollouts import evaluate
-from scengen.evaluate.settings import EvaluateSettings
+from scengen.evaluate.settings import EvaluateSettings, other_version
 from scengen.learn.data import TrainingData
 from scengen.learn.features import LARGEST_INPUT, Features
 from scengen.learn.player import TrainedPolicy
 from scengen.learn.store import StoredPolicy
 from scengen.learn.train import TrainSettings, train
+from scengen.tasks.domino_single import DominoSingle
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +80,21 @@ def test_a_chunk_is_played_before_the_next_is_predicted(memory, monkeypatch):
         assert len(calls) == 1 + step // 3
 
 
+def test_a_policy_of_another_version_of_its_task_is_played_with_a_line(memory, mine, tmp_path, capsys, monkeypatch):
+    assert StoredPolicy.open(memory).settings.task_version == 1
+    argv = ["evaluate", f"policy={mine}", f"pool={REFERENCE}", "seeds=1", "rollouts=1"]
+    assert cli.run([*argv, f"to={tmp_path / 'same'}"]) == 0 and "trained on" not in capsys.readouterr().err
+    monkeypatch.setattr(DominoSingle, "VERSION", 2)
+    assert cli.run([*argv, f"to={tmp_path / 'other'}"]) == 0
+    assert f"{mine} was trained on version 1 of domino_single; installed: 2" in capsys.readouterr().err
+    told = json.loads((tmp_path / "other" / "table.json").read_text())
+    assert told["task_versions"] == {"domino_single": 2}
+    change(mine, task_version=None)
+    told = other_version(EvaluateSettings(policy=str(mine)))
+    assert told == f"{mine} was trained on an unknown version of domino_single; installed: 2"
+    assert other_version(EvaluateSettings(policy="idle")) == ""
+
+
 def change(folder, **values):
     path = folder / "policy.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), **values}))
@@ -88,6 +104,8 @@ def change(folder, **values):
     ("values", "said"),
     [
         ({"kind": "knm"}, "did you mean 'knn'"),
+        ({"task_version": 0}, "task_version is 0"),
+        ({"task_version": "1"}, "task_version"),
         ({"chunk": 0}, "chunk is 0"),
         ({"rate": 30}, "rate = 30 does not divide 100"),
         ({"hidden": [10**9]}, "hidden layers too large"),
@@ -96,7 +114,7 @@ def change(folder, **values):
         ({"inputs": 10**6}, "inputs = 1000000"),
         ({"surprise": 1}, "no key named 'surprise'"),
         ({"weights_sha256": "0" * 64}, "its sha256 is not that in policy.json"),
-        ({"format": 99}, "has format 99, this scengen reads 3"),
+        ({"format": 99}, "has format 99, this scengen reads 4"),
     ],
 )
 def test_settings_of_a_stranger_are_refused(mine, values, said):

@@ -25,7 +25,7 @@ def shown(count=8, rows=60):
         hands = np.tile(np.array([0, 0, 0, 0, 0, 0, 1], np.float32), (rows, 1))  # so that goals are the actions
         actions = np.hstack([-seen, 0 * seen, grip]).astype(np.float32)
         found.append(Trajectory(f"{i:012x}", seen, hands, actions))
-    return TrainingData("push", ROBOT, 25, ("robot0_eef_pos",), ENTRIES, tuple(found), "0" * 64, {})
+    return TrainingData("push", 1, ROBOT, 25, ("robot0_eef_pos",), ENTRIES, tuple(found), "0" * 64, {})
 
 
 def trained(folder, progress=lambda *_: None, data=None, **changes):
@@ -101,12 +101,7 @@ def test_validation_uses_no_scenario_that_was_learned_from(tmp_path):
     """Several runs of one scenario are on the same side."""
     data = shown(8)
     twice = [replace(one, observations=one.observations + 0.01) for one in data.trajectories]
-    both = TrainingData(
-        *[getattr(data, n) for n in ("task", "embodiment", "rate", "streams", "entries")],
-        (*data.trajectories, *twice),
-        "1" * 64,
-        {},
-    )
+    both = replace(data, trajectories=(*data.trajectories, *twice), sha256="1" * 64)
     found = trained(tmp_path, policy=KNN, data=both)
     assert (found.settings.demonstrations, found.held_out) == (14, 2)
     assert found.losses[-1][1] > 0.01, "a run of the same scenario is 1 cm away"
