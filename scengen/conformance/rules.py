@@ -12,12 +12,12 @@ of them without a test file (`pytest_plugin`).
 
 import json
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
-from .. import compose
+from .. import compose, task_files
 from ..errors import ScengenError
 from ..ood import axis_card, axis_evidence, features
 from ..ood.baseline import BELIEF, INCONCLUSIVE
@@ -93,7 +93,11 @@ def checks(
         Rule(f"{split}: {_readable_name(check)}", partial(check, found, split, scenarios, seed))
         for split, check in wanted
     ]
-    return [Rule("the file tells what policies may know", partial(_describes_axes, found)), *of_splits]
+    return [
+        Rule("the file tells what policies may know", partial(_describes_axes, found)),
+        Rule("the family states its version", partial(_states_version, found, search(conf))),
+        *of_splits,
+    ]
 
 
 def _readable_name(check: Callable[..., None]) -> str:
@@ -164,6 +168,13 @@ def _describes_axes(task: Task) -> None:
     for name, axis in task.axes.items():
         _require(name not in task.instruction, f"the instruction of {task.name} names the axis {name}; leave it out")
         _require(bool(axis.why), f"axis {name} of {task.name} has no why; say why a habit from training fails there")
+
+
+def _states_version(task: Task, search: Sequence[str]) -> None:
+    """The version stands in the family's class as a plain number, so that environments are registered with it."""
+    read, where = task_files.version(task.name, search), f"{task.family.__name__} of {task.name}"
+    stated = "VERSION" in vars(task.family) and read == task.version
+    _require(stated, f"{where} has version {task.version}; state it in the class: VERSION = {task.version}")
 
 
 def _draws_are_keyed(task: Task, split: str, scenarios: int, seed: int) -> None:

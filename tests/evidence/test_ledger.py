@@ -73,17 +73,12 @@ def test_the_version_is_read_without_an_import_as_the_family_declares_it(name):
     assert task_files.version(name) == load_task(name).version
 
 
-def test_a_version_is_that_of_the_class_itself():
-    text = "class Other:\n    VERSION: ClassVar[int] = 3\n\nclass Family(Other):\n    pass  # VERSION\n"
-    assert task_files._declared(text, "Other") == 3
-    assert task_files._declared(text, "Family") == 1
-
-
-def test_a_family_that_is_not_there_is_told(tmp_path):
-    (tmp_path / "task").mkdir()
-    (tmp_path / "task" / "lost.yaml").write_text("family: scengen.tasks.nowhere.Lost\n")
-    with pytest.raises(BadConfig, match="there is no module scengen.tasks.nowhere"):
-        task_files.version("lost", [f"hydra.searchpath=[file://{tmp_path}]"])
+@pytest.mark.parametrize("stated", ["VERSION: ClassVar[int] = 3", "VERSION = 3"])
+def test_a_version_is_that_of_the_class_itself(tmp_path, stated):
+    path = tmp_path / "families.py"
+    path.write_text(f"class Other:\n    {stated}\n\nclass Family(Other):\n    pass  # VERSION\n")
+    assert task_files._stated_version(str(path), "Other") == 3
+    assert task_files._stated_version(str(path), "Family") == 1
 
 
 # --- measuring ------------------------------------------------------------------------------

@@ -68,6 +68,19 @@ def test_a_feature_with_the_name_of_a_parameter_is_caught(monkeypatch):
     assert "distance name both parameters and features" in told
 
 
+def test_a_version_that_is_not_in_the_class_itself_is_caught(monkeypatch):
+    monkeypatch.setattr(PushBlock, "VERSION", 2)
+    with pytest.raises(Nonconformity, match="has version 2; state it in the class"):
+        rules._states_version(load_task("push_block", SEARCH), SEARCH)
+
+
+@pytest.mark.parametrize("version", [0, -1, True, "2", 1.0])
+def test_a_version_that_is_no_number_from_one_on_is_refused(monkeypatch, version):
+    monkeypatch.setattr(PushBlock, "VERSION", version)
+    with pytest.raises(BadConfig, match=r"PushBlock.VERSION = .*; it must be a whole number, 1 or more"):
+        load_task("push_block", SEARCH)
+
+
 def test_an_instruction_that_names_its_axis_is_caught():
     task = replace(load_task("push_block", SEARCH), instruction="Push the block far.")
     with pytest.raises(Nonconformity, match="names the axis far"):
