@@ -32,7 +32,6 @@ from scengen import list_tasks, load_task
 from scengen.evidence import ledger
 from scengen.evidence.ledger import Evidence
 from scengen.learn.models import BC, MIP
-from scengen.learn.store import FORMAT
 from scengen.learn.train import TrainSettings
 from scengen.samplers.split import ID
 from scengen.statistics import paired, rate
@@ -303,7 +302,7 @@ def _table(columns: Sequence[str], lines: Sequence[str]) -> str:
 @cache
 def _trainings(*sets: str) -> dict[str, list[Evidence]]:
     """Rows of trainings on some sets of demonstrations, as they are made today, by task."""
-    today = {"format": FORMAT, "epochs": TrainSettings().epochs}
+    today = {"epochs": TrainSettings().epochs}
     known = {task: ledger.current("training", task) for task in list_tasks()}
     chosen = {
         task: [row for row in own if row.made_with["data"] in sets and row.has(**today)] for task, own in known.items()

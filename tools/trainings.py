@@ -38,7 +38,6 @@ from scengen.envs.observations import proprioception
 from scengen.evidence import measuring
 from scengen.learn.data import KEPT
 from scengen.learn.models import BC, KNN, MIP
-from scengen.learn.store import FORMAT
 from scengen.learn.train import TrainSettings
 from scengen.pool import Pool
 from scengen.samplers.split import ID
@@ -119,9 +118,9 @@ class Training:
 
     @property
     def made_with(self) -> dict[str, Any]:
-        """Settings of the training in the ledger: its own, and the format and the number of epochs of all trainings."""
+        """Settings of the training in the ledger: its own, and the number of epochs of all trainings."""
         own = {"data": self.data, "policy": self.policy, "size": self.size, "seed": self.seed}
-        return {**own, "format": FORMAT, "epochs": TrainSettings().epochs}
+        return {**own, "epochs": TrainSettings().epochs}
 
     @property
     def done(self) -> bool:

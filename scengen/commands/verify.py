@@ -150,7 +150,7 @@ def _with_hits(report: Report, pool: Pool, task: Task, limits: Limits) -> Report
     """The report on a pool. If the pool is sound so far, faults of the attack in its manifest are added."""
     if report.verdict != "sound" or pool.manifest.attack is None:
         return report
-    verdict: Verdict = "refuted"
+    verdict: Verdict = "refuted" if pool.manifest.task_version == task.version else "declined"
     try:
         found = apart(_wrong_hits, (pool, stored_task(pool, task)), limits, "replaying the hits of its attack")
     except WorkerDied as error:

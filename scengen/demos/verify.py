@@ -194,7 +194,8 @@ def verify_demonstrations(
         task = task_of_manifest(found, installed)
         task.shifts(manifest.config.split)
     except ScengenError as error:
-        report.faults.append(f"{DEMONSTRATIONS}: {error}")
+        other = another_version("made", manifest.task_version, installed)
+        (report.declined if other else report.faults).append(f"{DEMONSTRATIONS}: {error}")
         return report
     if other := another_version("made", manifest.task_version, task):
         report.remarks.append(f"{other}: what differs between the versions cannot be checked here")

@@ -94,27 +94,25 @@ def compare(
         cheats: kept cheats of the task; without them their rollouts are not played.
         every_split: whether the oracle plays in the other stored draws, too.
     """
-    same = same_machine(stored)
-    found = list(_without_rollouts(task, stored))
-    played: dict[str, list[Any]] = {}
-    try:
-        stage = Stage(task.draw(ID, SEED, 0).scenario, task.embodiment, task.horizon, cheats or {})
-    except Infeasible:
+    found, same = list(without_rollouts(task, stored)), same_machine(stored)
+    if (stage := _stage(task, cheats or {})) is None:
         return Compared(task.name, stored.version, tuple(found), 0, same)
-    if not any(each.kind == "scene" and each.what == f"{ID} 0" for each in found):
-        found += _rules(task.name, stored, asked(stage, stored))
-    played = {f"{ID} 0 {name}": result for name, result in rollouts(stage, wanted).items()}
+    played = {f"{FIRST}{name}": result for name, result in rollouts(stage, wanted).items()}
     if every_split:
         played |= oracles(task)
     found += _rollouts(task.name, stored.rollouts, played, same)
-    expected = {
-        name for name in stored.rollouts if name.startswith(f"{ID} 0 ") and wanted(name.removeprefix(f"{ID} 0 "))
-    }
-    gone = expected - played.keys() - {name for name in expected if " cheat " in name and not cheats}
-    found += [
-        Difference(task.name, "rollout", name, stored.rollouts[name][0], NOTHING, "version") for name in sorted(gone)
-    ]
+    first = [name for name in stored.rollouts if name.startswith(FIRST) and wanted(name.removeprefix(FIRST))]
+    gone = [name for name in first if name not in played and (cheats or " cheat " not in name)]
+    found += [Difference(task.name, "rollout", name, stored.rollouts[name][0], NOTHING, "version") for name in gone]
     return Compared(task.name, stored.version, tuple(found), len(played), same)
+
+
+def _stage(task: Task, cheats: Mapping[str, Cheat]) -> Stage | None:
+    """The first training draw; None if it has no feasible scenario."""
+    try:
+        return Stage(task.draw(ID, SEED, 0).scenario, task.embodiment, task.horizon, cheats)
+    except Infeasible:
+        return None
 
 
 def same_machine(stored: Behaviour) -> bool:
@@ -124,7 +122,17 @@ def same_machine(stored: Behaviour) -> bool:
     return stored.made["fingerprint"] == fingerprint() and all(made[name] == versions()[name] for name in names)
 
 
-def _without_rollouts(task: Task, stored: Behaviour) -> Iterator[Difference]:
+def without_rollouts(task: Task, stored: Behaviour) -> Iterator[Difference]:
+    """Differences of what needs no rollout: declared values, draws, scenes, constraints, rules."""
+    found = list(_described(task, stored))
+    yield from found
+    if any(each.kind == "scene" and each.what == f"{ID} 0" for each in found):
+        return  # the stored states belong to another scene
+    if stage := _stage(task, {}):
+        yield from _rules(task.name, stored, asked(stage, stored))
+
+
+def _described(task: Task, stored: Behaviour) -> Iterator[Difference]:
     """Differences of declared values, draws and constraints."""
     if task.version != stored.version:
         yield Difference(task.name, "version", "VERSION", stored.version, task.version, "version")

@@ -1,7 +1,7 @@
 """Claims of a row and its certificate, compared with what follows from the manifest, without simulation."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -27,8 +27,6 @@ from .rebuilt import MAX_ABSOLUTE_DIFFERENCE, MAX_RELATIVE_DIFFERENCE, rebuild
 from .rollout import AT_REST
 from .settings import CertifySettings
 
-OF_FAMILY = ("feasible", "shortcuts", "ablations")
-"""Checks whose numbers have names that the family gives."""
 NUMERICS = ("half_time_step", "twice_the_iterations")
 """Variations of the check `numerics`."""
 ROUNDING = 1e-6
@@ -110,13 +108,17 @@ def _labels(claims: Claims) -> dict[str, Any]:
 
 
 def wrong_names(row: PoolRow, scenario: Scenario) -> Iterator[str]:
-    """Id and hashes of a row that do not belong to its parameters, scene and witness."""
-    certificate = row.certificate
-    scene, witness = sha256(row.scene_xml), sha256(row.witness.tobytes())
+    """Id and parameters of a row that do not belong to each other."""
     if row.id != scenario.id:
         yield OfCode("the id does not belong to the parameters")
     if as_json(row.params) != canonical(scenario):
         yield OfCode("the parameters are incomplete, or not as the family writes them")
+
+
+def wrong_hashes(row: PoolRow) -> Iterator[str]:
+    """Hashes of a row that do not belong to its scene and witness."""
+    certificate = row.certificate
+    scene, witness = sha256(row.scene_xml), sha256(row.witness.tobytes())
     if {scene} != {row.scene_sha256, certificate.scene_sha256}:
         yield "the scene has another sha256 than its row or certificate says"
     if {witness} != {row.witness_sha256, certificate.witness_sha256}:
@@ -184,7 +186,8 @@ def wrong_rejection(row: PoolRow, scenario: Scenario, claims: Claims) -> Iterato
         yield f"the checks of this reject are not {', '.join(CHECKS)}, once each in this order"
         return
     nothing = _nothing_to_check(scenario, claims.settings)
-    failed = next((check for check in checks if not check.passed and check.reason != nothing.get(check.name)), None)
+    told = (check for check in checks if not check.passed and not check.waived)
+    failed = next((check for check in told if check.reason != nothing.get(check.name)), None)
     if failed is None or failed.passed is None:
         yield "this reject has not failed a check"
         return
@@ -255,27 +258,29 @@ def _witness_length_fits(numbers: Mapping[str, Any], seconds: float, row: PoolRo
 def _contradictions(checks: Mapping[str, Check], row: PoolRow, scenario: Scenario, claims: Claims) -> Iterator[str]:
     """Checks that cannot have passed with their numbers."""
     rules = {
-        "feasible": lambda n: alike(scenario.features(), n),
         "overlap": lambda n: set(n) == {"deepest"} and 0 <= n["deepest"] <= claims.settings.overlap,
         "rest": lambda n: _rest_holds(n, claims.settings),
         "unsolved": lambda n: n == {},
         "idle": lambda n: _goal_missed(n, True),
-        "shortcuts": lambda n: _shortcuts_failed(n, scenario),
+        "shortcuts": lambda n: all(_shortcut_failed(one) for told in n.values() for one in told.values()),
         "solved": lambda n: _solved_in_time(n, claims.task.horizon),
         "robust": lambda n: _robust_holds(n, claims.settings),
         "numerics": _numerics_hold,
-        "ablations": lambda n: set(n) == set(scenario.ablations()) and all(_goal_missed(r, True) for r in n.values()),
+        "ablations": lambda n: all(_goal_missed(one, True) for one in n.values()),
         "witness": lambda n: _witness_length_fits(n, checks["solved"].numbers["seconds"], row, claims.settings.settle),
         "attack": lambda n: _attack_failed(n, claims.settings),
     }
+    of_family = {
+        "feasible": lambda n: alike(scenario.features(), n),
+        "shortcuts": lambda n: _of_shortcuts(n, scenario),
+        "ablations": lambda n: set(n) == set(scenario.ablations()),
+    }
+    for name, holds in of_family.items():
+        if not _holds(holds, checks[name]):
+            yield OfCode(f"check {name} cannot have passed with its numbers: they are not those of this family")
     for name, holds in rules.items():
-        try:
-            fine = holds(checks[name].numbers)
-        except (TypeError, KeyError, AttributeError, ValueError):
-            fine = False
-        if not fine:
-            told = f"check {name} cannot have passed with its numbers, or they are not those of this family"
-            yield OfCode(told) if name in OF_FAMILY else told
+        if not _holds(holds, checks[name]):
+            yield f"check {name} cannot have passed with its numbers, or they are not those of this family"
     if not passed_filter(row.witness):
         yield "the witness has actions that the teleoperation filter cannot give"
 
@@ -292,10 +297,19 @@ def _goal_missed(numbers: Mapping[str, Any], unstable: bool) -> bool:
     return set(numbers) == {"outcome", "reason", "seconds"} and numbers["outcome"] in known and numbers["seconds"] >= 0
 
 
-def _shortcuts_failed(numbers: Mapping[str, Any], scenario: Scenario) -> bool:
+def _holds(rule: Callable[[Mapping[str, Any]], bool], check: Check) -> bool:
+    """Whether a rule holds for the numbers of a check, which may have any form."""
+    try:
+        return rule(check.numbers)
+    except (TypeError, KeyError, AttributeError, ValueError):
+        return False
+
+
+def _of_shortcuts(numbers: Mapping[str, Any], scenario: Scenario) -> bool:
+    """Whether these are the numbers of the family's shortcuts, each filtered and raw, and to rest if it has to be."""
     known = scenario.shortcuts()
     tries = [(known[name], n) for name, told in numbers.items() for n in told.values() if set(told) == set(ACTIONS)]
-    seen = all(_shortcut_failed(n) and (not shortcut.to_rest or n["reason"] == AT_REST) for shortcut, n in tries)
+    seen = all(not shortcut.to_rest or n["reason"] == AT_REST for shortcut, n in tries)
     return set(numbers) == set(known) and len(tries) == len(ACTIONS) * len(known) and seen
 
 

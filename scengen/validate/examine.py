@@ -16,6 +16,7 @@ from .claims import (
     compiles,
     scene_or_nothing,
     wrong_certificate,
+    wrong_hashes,
     wrong_labels,
     wrong_names,
     wrong_rejection,
@@ -102,10 +103,13 @@ class Examiner:
 
     def _examined(self, row: PoolRow, simulated: bool, certified: bool) -> Examination:
         claims = self.claims
-        reasons = list(wrong_labels(row, claims))
+        reasons = [*wrong_labels(row, claims), *wrong_hashes(row)]
         if row.task != claims.task.name:
             return Examination(row.id, "refuted", tuple(reasons))
-        scenario = claims.task.scenario(row.params)
+        try:
+            scenario = claims.task.scenario(row.params)
+        except ScengenError as error:
+            return self._judged(row, [*reasons, OfCode(str(error))])
         reasons += [*wrong_names(row, scenario), *wrongly_drawn(row, claims)]
         reasons += (wrong_certificate if certified else wrong_rejection)(row, scenario, claims)
         text = rebuild(scenario) if compiles(row) else scene_or_nothing(scenario)

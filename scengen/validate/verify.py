@@ -16,7 +16,7 @@ from ..samplers.task import Task
 from ..work.parallel import Limits, Workers, each
 from . import survey
 from .certify import Adversary
-from .claims import Claims, OfCode
+from .claims import Claims, OfCode, another_version
 from .examine import Answer, Examination, Examiner, Failed, Job, LeftOut, lost_examination
 from .findings import Findings, Report
 from .settings import CertifySettings
@@ -67,12 +67,18 @@ def verify(
     found = Findings(options.level)
     for name, what in pool.damaged().items():
         found.of_pool(name, "refuted", f"the shard {what}")
+    other = another_version("certified", pool.manifest.task_version, installed)
     try:
-        task, settings = task_of_manifest(pool, installed), settings_of_manifest(pool.manifest)
+        settings = settings_of_manifest(pool.manifest)
+    except (ScengenError, ArithmeticError, MemoryError, RecursionError) as error:
+        found.of_pool(MANIFEST, "refuted", str(error))
+        return found.report()
+    try:
+        task = task_of_manifest(pool, installed)
         claims = Claims.of(pool, task, settings)
     except (ScengenError, ArithmeticError, MemoryError, RecursionError) as error:
-        other = pool.manifest.task_version != installed.version
-        found.of_pool(MANIFEST, "declined" if other else "refuted", str(error))
+        told = ("declined", f"{other}, where {error}") if other else ("refuted", str(error))
+        found.of_pool(MANIFEST, *told)
         return found.report()
     found.compare_tasks(installed, task)
     found.name_settings(settings, levels)

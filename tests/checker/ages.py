@@ -5,7 +5,7 @@ not turn a fault into a success: what cannot be compared is declined, and never 
 """
 
 from forgery import ELSEWHERE, Case, Draft
-from labels import Change, _both, _certificate, _config, _manifest, _param, _task
+from labels import Change, _both, _certificate, _config, _manifest, _param, _row, _task
 
 VERSION = r"version 2 of domino_single"
 """Reason why a claim against another version is declined."""
@@ -45,6 +45,15 @@ def _jerk(draft: Draft) -> None:
     draft.row["witness"][6] = 1.0
 
 
+def _solved_by_shortcut(draft: Draft) -> None:
+    numbers = draft.check("shortcuts")["numbers"]
+    numbers[min(numbers)]["raw"]["outcome"] = "success"
+
+
+def _gone(draft: Draft) -> None:
+    draft.row["params"]["gone"] = 1.0
+
+
 GRAVITY = _scene("<option ", '<option gravity="0 0 -3" ')
 SLIPPERY = _scene('friction="[^"]*"', 'friction="0.1 0.005 0.0001"')
 
@@ -66,6 +75,8 @@ CHANGES: dict[str, tuple[str, str, Change]] = {
     "other_version_other_seed": ("refuse", VERSION, _both(_config(seed=77), _version(2))),
     "other_version_wrong_hash": ("reject", r"sha256", _both(_unsealed, _version(2))),
     "other_version_unfiltered": ("reject", r"filter", _both(_jerk, _version(2))),
+    "other_version_shortcut_solves": ("reject", r"shortcuts", _both(_solved_by_shortcut, _version(2))),
+    "other_version_unknown_parameter": ("reject", r"horizon", _both(_row(horizon=60.0), _gone, _version(2))),
     # versions that contradict each other, or are none
     "version_of_a_row": ("reject", r"task_version", _certificate(task_version=2)),
     "version_of_the_manifest": ("refuse", r"task_version", _manifest(task_version=2)),

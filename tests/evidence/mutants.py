@@ -1,8 +1,9 @@
 """Share of small changes of the tasks' code that their stored behaviour notices.
 
-    python tests/evidence/mutants.py N [SEED] [TASK ...]
+    python tests/evidence/mutants.py N PART [SEED] [TASK ...]
 
-N one-point changes are chosen at random among all families: a number times 1.02 or 1.3, a comparison inverted, a
+N one-point changes of `rules` or of `plans` are chosen at random among all families: a number times 1.02 or 1.3, a
+comparison inverted, a
 condition that is never true, `and` for `or`. They lie in the rules (`success`, `failure`, `events`, `build`,
 `constraints` and the methods that these use), or in plans. Each is applied in a process of its own, and the task is
 compared with its file, cheap parts first. The result is one JSON line for each change in generated/mutants.jsonl.
@@ -18,7 +19,7 @@ import os
 import random
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from typing import Any
 from scengen import compose, list_tasks, load_task
 from scengen.evidence import comparison
 from scengen.evidence.behaviour import Behaviour
+from scengen.samplers.task import Task
 from scengen.task_files import behaviour_file
 
 ROOT = Path(__file__).parents[2]
@@ -140,6 +142,13 @@ class Loader(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(compile(self.tree, str(self.path), "exec"), module.__dict__)
 
 
+def differences(task: Task, stored: Behaviour) -> Iterator[Sequence[comparison.Difference]]:
+    """Differences of a task from its file, what is cheap to find first."""
+    yield list(comparison.without_rollouts(task, stored))
+    yield comparison.compare(task, stored, lambda name: name == "oracle").differences
+    yield comparison.compare(task, stored, lambda name: name != "oracle").differences
+
+
 def judged(mutant: Mutant) -> dict[str, Any]:
     """Whether a change is noticed, and by which kinds of differences."""
     stored = Behaviour.read(behaviour_file(mutant.task))
@@ -152,11 +161,9 @@ def judged(mutant: Mutant) -> dict[str, Any]:
     try:
         compose._loaded_once.cache_clear()
         task = load_task(mutant.task)
-        for wanted in (lambda name: name == "oracle", lambda name: name != "oracle"):
-            found = comparison.compare(task, stored, wanted)
-            if found.differences:
-                levels = {difference.level for difference in found.differences}
-                kinds = sorted({difference.kind for difference in found.differences})
+        for found in differences(task, stored):
+            if found:
+                levels, kinds = {each.level for each in found}, sorted({each.kind for each in found})
                 return told | {"seen": True, "kinds": kinds, "level": "version" if "version" in levels else "bits"}
     except Exception as error:  # a change may break anything
         return told | {"seen": True, "kinds": [f"{type(error).__name__}: {error}"[:120]], "level": "error"}
@@ -180,9 +187,9 @@ def apart(mutant: Mutant) -> dict[str, Any]:
     )
 
 
-def main(n: str, seed: str = "0", *names: str) -> None:
+def main(n: str, part: str, seed: str = "0", *names: str) -> None:
     known = [task for task in names or list_tasks() if behaviour_file(task).is_file()]
-    every = [mutant for task in known for mutant in mutants(task)]
+    every = [mutant for task in known for mutant in mutants(task) if mutant.part == part]
     random.Random(int(seed)).shuffle(every)
     chosen = every[: int(n)]
     target = ROOT / "generated" / "mutants.jsonl"
