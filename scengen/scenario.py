@@ -127,7 +127,8 @@ class Scenario(abc.ABC):
     """
 
     VERSION: ClassVar[int] = 1
-    """Version of the task. It rises when draws, scenes, rules or verdicts change, and never for a refactoring."""
+    """Version of the task. It rises when draws, scenes, rules or verdicts change, and never for a refactoring. A
+    family states it in its own class, from which it is also read without an import."""
     HOLD: ClassVar[float] = 0.0
     """Time for which the goal must hold without interruption before it counts [s]."""
     MOVING: ClassVar[tuple[str, ...]] = ()

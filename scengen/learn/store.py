@@ -192,7 +192,8 @@ class StoredPolicy:
         content = arrays_as_bytes(self.arrays)
         settings = replace(self.settings, weights_sha256=sha256(content))
         write(folder / WEIGHTS, content)
-        write(folder / SETTINGS, json.dumps({"format": FORMAT, **asdict(settings)}, indent=1, sort_keys=True) + "\n")
+        told = {name: value for name, value in asdict(settings).items() if value is not None}
+        write(folder / SETTINGS, json.dumps({"format": FORMAT, **told}, indent=1, sort_keys=True) + "\n")
         return settings
 
 

@@ -13,6 +13,7 @@ from helpers import REFERENCE
 from scengen import cli
 from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.learn.data import TrainingData
+from scengen.learn.store import read_settings
 
 NOTHING = {"of another task": 0, "failed": 0, "not kept by the curation": 0}
 
@@ -118,7 +119,7 @@ def test_a_recording_of_an_earlier_release_has_an_unknown_version(mine, tmp_path
     assert TrainingData.read(mine).task_version is None
     assert cli.run(["train", "policy=knn", f"data={mine}", f"to={tmp_path / 'policy'}"]) == 0
     assert "recorded with an unknown version of domino_single; installed: 1" in capsys.readouterr().err
-    assert json.loads((tmp_path / "policy" / "policy.json").read_text())["task_version"] is None
+    assert read_settings(tmp_path / "policy").task_version is None
 
 
 def rewrite_versions(folder, told):

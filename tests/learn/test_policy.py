@@ -89,7 +89,9 @@ def test_a_policy_of_another_version_of_its_task_is_played_with_a_line(memory, m
     assert f"{mine} was trained on version 1 of domino_single; installed: 2" in capsys.readouterr().err
     told = json.loads((tmp_path / "other" / "table.json").read_text())
     assert told["task_versions"] == {"domino_single": 2}
-    change(mine, task_version=None)
+    settings = json.loads((mine / "policy.json").read_text())
+    del settings["task_version"]
+    (mine / "policy.json").write_text(json.dumps(settings))
     told = other_version(EvaluateSettings(policy=str(mine)))
     assert told == f"{mine} was trained on an unknown version of domino_single; installed: 2"
     assert other_version(EvaluateSettings(policy="idle")) == ""
