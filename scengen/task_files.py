@@ -4,7 +4,6 @@ This is the fast path for commands that must answer quickly. Task files are in c
 offer tasks, and in folders that a command line names.
 """
 
-import ast
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -142,19 +141,10 @@ def version(name: str, search: Sequence[str] = ()) -> int:
 
 @cache
 def _stated_version(path: str, family: str) -> int:
-    """The `VERSION` of a class in a Python file; 1 if it states none."""
-    text = Path(path).read_text()
-    if "VERSION" not in text:  # parsing takes a hundred times as long
-        return 1
-    classes = [node for node in ast.parse(text).body if isinstance(node, ast.ClassDef) and node.name == family]
-    for line in (line for node in classes for line in node.body):
-        match line:
-            case (
-                ast.AnnAssign(target=ast.Name(id="VERSION"), value=ast.Constant(value=int(stated)))
-                | ast.Assign(targets=[ast.Name(id="VERSION")], value=ast.Constant(value=int(stated)))
-            ):
-                return stated
-    return 1
+    """The `VERSION` of a class in a Python file; 1 if it states none. Parsing the files of all tasks takes 0.3 s."""
+    of_class = re.search(rf"^class {family}\b.*?(?=^class |\Z)", Path(path).read_text(), re.M | re.S)
+    stated = of_class and re.search(r"^    VERSION\b[^=\n]*=\s*(\d+)\s*$", of_class[0], re.M)
+    return int(stated[1]) if stated else 1
 
 
 @dataclass(frozen=True)
