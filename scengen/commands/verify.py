@@ -243,9 +243,12 @@ def _replay_hits(hits: str, pool: str | list[str] | None, search: Sequence[str])
     wrong = 0
     for path in paths:
         hit = Hit.load(path)
-        reason = unsound(hit, attacked_task or compose.load_task(hit.task, search))
+        task = attacked_task or compose.load_task(hit.task, search)
+        reason = unsound(hit, task)
         wrong += bool(reason)
         say(f"{path.name}: {reason or f'reaches the goal of {hit.scenario} after {hit.seconds:g} s, {hit}'}")
+        if other := task.other_version("found on", hit.task_version):
+            say(f"{path.name}: {other}")
     say(f"{len(paths) - wrong} of {len(paths)} hits replay")
     return FAILED if wrong else OK
 

@@ -18,7 +18,7 @@ from ..samplers.split import Split
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
-from ..validate.claims import OfCode, another_version, comparable, passed_filter
+from ..validate.claims import OfCode, comparable, passed_filter
 from ..validate.examine import Verdict
 from ..validate.identity import check_versions
 from ..validate.labels import labels_of_draw, labels_of_task
@@ -76,7 +76,7 @@ class Judge:
     oracle: bool
     """Whether the oracle plays again, too."""
     other_version: str = ""
-    """Versions in words if the demonstrations were made on another one, see `claims.another_version`."""
+    """Versions in words if the demonstrations were made on another one, see `Task.other_version`."""
 
     def __call__(self, row: DemonstrationRow) -> Examined:
         try:
@@ -194,10 +194,10 @@ def verify_demonstrations(
         task = task_of_manifest(found, installed)
         task.shifts(manifest.config.split)
     except ScengenError as error:
-        other = another_version("made", manifest.task_version, installed)
+        other = installed.other_version("made on", manifest.task_version)
         (report.declined if other else report.faults).append(f"{DEMONSTRATIONS}: {error}")
         return report
-    if other := another_version("made", manifest.task_version, task):
+    if other := task.other_version("made on", manifest.task_version):
         report.remarks.append(f"{other}: what differs between the versions cannot be checked here")
     same = manifest.fingerprint == fingerprint()
     if not same:

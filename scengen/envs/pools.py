@@ -1,5 +1,6 @@
 """The scenarios that an environment plays: those of some pools, of a split, or one of them."""
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,6 +11,8 @@ from ..pool.collection import members
 from ..pool.demonstrations import Demonstrations, is_demonstrations
 from ..pool.library import Library
 from ..pool.rows import AnyRow
+from ..task_files import tasks as known_tasks
+from ..task_files import version
 from ..validate.identity import check_versions
 
 Folders = str | Path | Sequence[str | Path]
@@ -84,4 +87,16 @@ def _checked(pool: AnyRows, task: str) -> AnyRows:
         raise PoolError(f"{pool.folder} holds no scenario; fill it with scengen generate")
     if others := {*tasks} - {task}:
         raise PoolError(f"{pool.folder} holds scenarios of {', '.join(sorted(others))}, not of {task}")
+    if told := of_another_version(pool):
+        warnings.warn(told, stacklevel=2)
     return pool
+
+
+def of_another_version(pool: Pool | Demonstrations) -> str:
+    """A line about a pool whose task has another version here; empty if it has the same one."""
+    here = version(pool.task) if pool.task in known_tasks() else pool.manifest.task_version
+    made = pool.manifest.task_version
+    if made == here:
+        return ""
+    told = f"{pool.folder} was made on version {made} of {pool.task}; installed: {here}"
+    return f"{told}; its scenes are played under the installed rules, see scengen verify"

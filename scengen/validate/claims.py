@@ -38,14 +38,6 @@ class OfCode(str):
     task that is installed; otherwise the author's claim is about other code, and cannot be decided here."""
 
 
-def another_version(made: str, version: int, task: Task) -> str:
-    """The version on which something was `made`, and the installed one, in words; empty if they are the same."""
-    if version == task.version:
-        return ""
-    remedy = "; a newer scengen can check it" if version > task.version else ""
-    return f"{made} against version {version} of {task.name}, installed: {task.version}{remedy}"
-
-
 @dataclass(frozen=True)
 class Claims:
     """What a pool says of all its rows."""
@@ -73,7 +65,7 @@ class Claims:
     @property
     def of_another_version(self) -> str:
         """The versions of the task in words, if the pool was certified on another one; empty if not."""
-        return another_version("certified", self.manifest.task_version, self.task)
+        return self.task.other_version("certified against", self.manifest.task_version)
 
     @cached_property
     def design(self) -> Design:

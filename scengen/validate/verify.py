@@ -16,7 +16,7 @@ from ..samplers.task import Task
 from ..work.parallel import Limits, Workers, each
 from . import survey
 from .certify import Adversary
-from .claims import Claims, OfCode, another_version
+from .claims import Claims, OfCode
 from .examine import Answer, Examination, Examiner, Failed, Job, LeftOut, lost_examination
 from .findings import Findings, Report
 from .settings import CertifySettings
@@ -67,7 +67,7 @@ def verify(
     found = Findings(options.level)
     for name, what in pool.damaged().items():
         found.of_pool(name, "refuted", f"the shard {what}")
-    other = another_version("certified", pool.manifest.task_version, installed)
+    other = installed.other_version("certified against", pool.manifest.task_version)
     try:
         settings = settings_of_manifest(pool.manifest)
     except (ScengenError, ArithmeticError, MemoryError, RecursionError) as error:

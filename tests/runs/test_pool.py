@@ -391,7 +391,7 @@ def test_a_pool_of_another_version_that_reproduces_is_sound_and_says_so(mine):
     made_with(mine, task_version=2)
     report = examined(mine)
     assert (report.verdict, report.sound, report.claimed, report.versions) == ("sound", 3, 0, [2, 1])
-    assert any("certified against version 2 of domino_single, installed: 1" in remark for remark in report.remarks)
+    assert any("certified against version 2 of domino_single; installed: 1" in remark for remark in report.remarks)
 
 
 def test_what_differs_from_another_version_is_a_claim(mine, monkeypatch):
@@ -402,7 +402,7 @@ def test_what_differs_from_another_version_is_a_claim(mine, monkeypatch):
     report = examined(mine)
     assert (report.verdict, report.sound, report.declined, report.claimed) == ("declined", 0, 3, 3)
     reason = report.failed[0]["reason"]
-    assert reason.startswith("certified against version 1 of domino_single, installed: 2, where the witness fails")
+    assert reason.startswith("certified against version 1 of domino_single; installed: 2, where the witness fails")
     again = examined(mine, level="full")
     assert again.claimed == 3
     assert "certified again against version 2 it is unknown solved: the oracle failed" in again.failed[0]["reason"]
