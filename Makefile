@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations axes beliefs attacks drift baselines curves docs site reference bench clean checker checker-base mutants
+.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations axes beliefs attacks drift baselines curves docs site reference bench clean checker checker-base mutants behaviour behaviour-check
 
 setup: $(READY)
 
@@ -192,6 +192,14 @@ mutants: setup
 # Makes the sound pools of the corpus again; needed when a family changes.
 checker-base: setup
 	$(BIN)/python tests/checker/make_base.py
+
+# Stores the behaviour of tasks whose bits or version have changed (a minute for each). TASKS=packing selects tasks. behaviour-check
+# plays all that is stored for tasks whose code has changed since the last time (a minute for each).
+behaviour: setup
+	$(BIN)/python tools/behaviour.py write $(TASKS)
+
+behaviour-check: setup
+	$(BIN)/python tools/behaviour.py check changed $(TASKS)
 
 # Makes the small pool in the repository again; needed when a family or the format changes.
 reference: setup

@@ -10,17 +10,20 @@ import json
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
+from llvmlite import binding
 from numpy.typing import NDArray
 
 from ..assets.prop import table
 from ..errors import Infeasible, PoolError
 from ..fingerprint import fingerprint
 from ..params import parameters
+from ..samplers.dists import Dist
 from ..samplers.split import ID
 from ..samplers.task import Draw, Task
 from ..scenario import Plan, Scenario
@@ -30,9 +33,10 @@ from ..validate.identity import source_sha256
 from ..validate.rebuilt import portable_sha256
 from ..versions import versions
 from . import edges, rules
+from .episodes import episodes_sha256
 from .rollouts import Stage
 
-FORMAT = 1
+FORMAT = 2
 """Format of a behaviour file, which includes the rollouts and states of which it consists."""
 SEED = 7
 """Seed of the draws."""
@@ -53,8 +57,8 @@ class Behaviour:
     task: str
     version: int
     made: Mapping[str, Any]
-    """`fingerprint` of the machine, `versions` of packages, and `text`, the hash of the code at the last full
-    comparison."""
+    """`machine`, see `machine`; `fingerprint` of machine and controller; `versions` of packages; and `text`, the hash
+    of the code at the last full comparison."""
     declared: Mapping[str, Any]
     """Declared values: time limit, instruction, bounds, distributions, hash of the robot."""
     draws: Mapping[str, Mapping[str, Any]]
@@ -116,37 +120,50 @@ def declared(task: Task) -> dict[str, Any]:
         "horizon": task.horizon,
         "embodiment": task.embodiment,
         "robot": robot_sha256(task.embodiment),
+        "episodes": episodes_sha256(),
         "hold": family.HOLD,
         "moving": list(family.MOVING),
         "disturbed": list(family.DISTURBED),
         "symmetries": sorted(map(repr, family.SYMMETRIES)),
         "certify": json.dumps(task.certify, sort_keys=True),
-        "steps": list(task.nominal.steps()),
+        "steps": sorted(task.nominal.steps()),
         "shortcuts": {name: shortcut.to_rest for name, shortcut in task.nominal.shortcuts().items()},
     }
     for p in parameters(task.nominal):
         told = [p.nominal, p.unit, p.low, p.high, p.period, "hidden" if p.hidden else "seen"]
         found[f"parameter {p.name}"] = told
-    found |= {f"{ID} {name}": str(dist) for name, dist in sorted(task.training.items())}
+    found |= {f"{ID} {name}": quantiles(dist) for name, dist in sorted(task.training.items())}
     for axis in task.axes.values():
         for name, dist in axis.replace.items():
-            found[f"{axis.name} {name}"] = f"{dist} {axis.severities} {axis.limits.get(name, '')}".strip()
+            found[f"{axis.name} {name}"] = [*quantiles(dist), axis.severities, axis.limits.get(name)]
     return found
+
+
+QUANTILES = (1e-9, 0.25, 0.5, 0.75, 1.0 - 1e-9)
+"""Numbers at which a distribution is asked for its values, so that its class may be written in another way."""
+
+
+def quantiles(dist: Dist) -> list[float]:
+    """Values of a distribution, to six digits; one for a constant."""
+    found = [_rounded(float(dist.quantile(u))) for u in QUANTILES]
+    return found[:1] if len(set(found)) == 1 else found
 
 
 ROBOT_FIELDS = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "jnt_range", "jnt_axis", "jnt_pos"),
     *("dof_damping", "dof_armature", "dof_frictionloss", "geom_size", "geom_pos", "geom_quat", "geom_friction"),
     *("geom_solref", "geom_solimp", "mesh_vert", "site_pos", "site_quat", "actuator_gainprm", "actuator_biasprm"),
-    *("actuator_ctrlrange", "geom_contype", "geom_conaffinity", "geom_condim", "geom_type"),
+    *("actuator_ctrlrange", "actuator_forcerange", "actuator_gear", "geom_contype", "geom_conaffinity", "geom_condim"),
+    *("geom_type", "geom_margin", "geom_gap", "jnt_stiffness", "jnt_margin", "cam_pos", "cam_quat", "cam_fovy"),
 )
-"""Fields of a compiled model that say what the robot is."""
+"""Fields of a compiled model that say what the robot is, and how it looks."""
 
 
 def robot_sha256(embodiment: str) -> str:
-    """Hash of the robot of an embodiment on an empty table, to six digits."""
-    model = World.load(scene_text.emit(table())[0], embodiment).model
-    parts = [np.asarray(getattr(model, name), float).ravel() for name in ROBOT_FIELDS]
+    """Hash of the robot of an embodiment on an empty table, in its first posture, to six digits."""
+    world = World.load(scene_text.emit(table())[0], embodiment, visual=True)
+    parts = [np.asarray(getattr(world.model, name), float).ravel() for name in ROBOT_FIELDS]
+    parts.append(world.data.qpos)
     text = " ".join(f"{value + 0.0:.6g}" for value in np.concatenate(parts).tolist())
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
@@ -260,7 +277,7 @@ def explored(stage: Stage, states: Sequence[NDArray[np.float64]]) -> dict[str, A
         probe = rules.Probe(scenario, world, unpacked(text))
         described_states.append(_answers(probe, number, along, contacts, book, text))
         for limit in rules.limits(probe, number, along):
-            kind = (limit.before, limit.after, limit.coordinate.kind, limit.coordinate.of)
+            kind = (limit.before, limit.after, limit.coordinate.kind, limit.coordinate.of, limit.coordinate.axis)
             counts[kind] = counts.get(kind, 0) + 1
             if counts[kind] <= rules.MAX_LIMITS:
                 numbers = book.numbers(limit.before), book.numbers(limit.after)
@@ -345,7 +362,29 @@ def oracles(task: Task) -> dict[str, list[Any]]:
 
 def made(task: Task) -> dict[str, Any]:
     """With what a behaviour is observed."""
-    return {"fingerprint": fingerprint(), "versions": versions(), "text": source_sha256(task.family)}
+    told = {"machine": machine(), "fingerprint": fingerprint(), "versions": versions()}
+    return {**told, "text": source_sha256(task.family)}
+
+
+@cache
+def machine() -> str:
+    """Hash of how this machine rounds without any code of scengen: MuJoCo, numpy, and the processor for which numba
+    compiles. The fingerprint changes with the controller, too."""
+    model = mujoco.MjModel.from_xml_string(TUMBLING)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 300)
+    numbers = np.sin(np.arange(1.0, 200.0)).reshape(-1, 1) ** np.arange(1, 20)
+    product = np.linalg.solve(numbers.T @ numbers + np.eye(19), np.exp(-np.arange(19.0)))
+    told = [binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()]
+    return hashlib.sha256(data.qpos.tobytes() + product.tobytes() + "".join(told).encode()).hexdigest()[:16]
+
+
+TUMBLING = """
+<mujoco><option cone="elliptic" impratio="20"/><worldbody><geom type="plane" size="1 1 1"/>
+<body pos="0 0 0.3" euler="20 30 40"><freejoint/><geom type="box" size="0.03 0.02 0.05"/></body>
+<body pos="0.01 0 0.5"><freejoint/><geom type="capsule" size="0.02 0.04"/></body></worldbody></mujoco>
+"""
+"""Two bodies that fall on each other."""
 
 
 def played_afresh(task: Task, seed: int, count: int) -> dict[str, Any]:

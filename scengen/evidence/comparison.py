@@ -18,6 +18,7 @@ from .behaviour import (
     declared,
     drawn,
     is_core,
+    machine,
     oracles,
     rollouts,
     splits,
@@ -119,7 +120,7 @@ def same_machine(stored: Behaviour) -> bool:
     """Whether this machine and its packages give the bits of a file."""
     names = ("mujoco", "robosuite", "numpy")
     made = stored.made["versions"]
-    return stored.made["fingerprint"] == fingerprint() and all(made[name] == versions()[name] for name in names)
+    return stored.made["machine"] == machine() and all(made[name] == versions()[name] for name in names)
 
 
 def without_rollouts(task: Task, stored: Behaviour) -> Iterator[Difference]:
@@ -134,6 +135,8 @@ def without_rollouts(task: Task, stored: Behaviour) -> Iterator[Difference]:
 
 def _described(task: Task, stored: Behaviour) -> Iterator[Difference]:
     """Differences of declared values, draws and constraints."""
+    if same_machine(stored) and stored.made["fingerprint"] != fingerprint():
+        yield Difference(task.name, "controller", "fingerprint", stored.made["fingerprint"], fingerprint(), "bits")
     if task.version != stored.version:
         yield Difference(task.name, "version", "VERSION", stored.version, task.version, "version")
     yield from _mappings(task.name, "declared value", stored.declared, declared(task), task.axes)

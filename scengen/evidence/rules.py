@@ -188,7 +188,7 @@ def coordinates(world: World) -> Iterator[Coordinate]:
         *(("memory", name, 0) for name in world.memory.names),
         ("time", "", 0),
     ]
-    for kind, of, axis in axes:
+    for kind, of, axis in sorted(axes):  # whatever the order of bodies and memory
         yield from (Coordinate(kind, of, axis, sign) for sign in (1, -1))
 
 

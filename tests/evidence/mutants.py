@@ -147,6 +147,7 @@ def differences(task: Task, stored: Behaviour) -> Iterator[Sequence[comparison.D
     yield list(comparison.without_rollouts(task, stored))
     yield comparison.compare(task, stored, lambda name: name == "oracle").differences
     yield comparison.compare(task, stored, lambda name: name != "oracle").differences
+    yield comparison.compare(task, stored, lambda name: False, every_split=True).differences
 
 
 def judged(mutant: Mutant) -> dict[str, Any]:

@@ -311,7 +311,7 @@ def test_a_scenario_that_occurs_twice_is_found(mine):
     assert any("index 0 occurs twice" in f["reason"] for f in failures(mine))
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[]", '{"format": 3}', '{"format": 3, "shards": []}', "\x00"])
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"format": 4}', '{"format": 4, "shards": []}', "\x00"])
 def test_a_damaged_manifest_is_one_clear_error(mine, text):
     (mine / "manifest.json").write_text(text)
     with pytest.raises(PoolError, match="is damaged; restore it"):
@@ -357,7 +357,7 @@ def gap_in_a_certificate(columns):
         (uncanonical, "from row 1 on .*not a mapping in canonical JSON"),
         (gap, "column instruction has missing values"),
         (gap_in_a_certificate, "from row 1 on .*the certificate lacks source_sha256"),
-        (lambda columns: columns.pop("id_twin"), "its columns are not those of pool format 3"),
+        (lambda columns: columns.pop("id_twin"), "its columns are not those of pool format 4"),
     ],
 )
 def test_a_shard_that_is_no_table_of_rows_is_one_clear_error(mine, damage, says):

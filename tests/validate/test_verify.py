@@ -430,7 +430,7 @@ def test_a_manifest_of_another_form_is_refused(mine, change, says):
 
 
 @pytest.mark.parametrize(
-    "text", ["[" * 200_000, '{"format": 3, "a": ' + "[" * 500 + "]" * 500 + "}", '{"format": 3, "format": 3}']
+    "text", ["[" * 200_000, '{"format": 4, "a": ' + "[" * 500 + "]" * 500 + "}", '{"format": 4, "format": 4}']
 )
 def test_a_manifest_with_deep_or_double_entries_is_refused(mine, text):
     (mine / "manifest.json").write_text(text)

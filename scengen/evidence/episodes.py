@@ -1,0 +1,60 @@
+"""What an episode makes of the answers of a goal and its failure, whatever the task is."""
+
+import hashlib
+import json
+from functools import cache
+from itertools import product
+from types import SimpleNamespace
+from typing import Any, cast
+
+import mujoco
+
+from ..control.loop import Loop
+from ..episode import RULES, Episode, Rules
+from ..scenario import Scenario, Strict
+from ..sim.world import World
+
+Answer = tuple[bool, str | None]
+"""Whether the goal holds, and the reason of a failure or None, in a control period."""
+
+ANSWERS: tuple[Answer, ...] = ((False, None), (True, None), (False, "lost"), (True, "lost"), (True, Strict("lost")))
+"""Answers of which episodes are made."""
+PERIODS = 5
+"""Number of control periods of an episode; the time limit is one less."""
+
+
+class Scripted(Scenario):
+    """A scenario that gives one answer after the other."""
+
+    HOLD = 2 * Loop.PERIOD
+
+    def __init__(self) -> None:
+        self.now: Answer = ANSWERS[0]
+
+    def build(self) -> mujoco.MjSpec:
+        """Never called: there is no scene."""
+        raise NotImplementedError
+
+    def success(self, world: World) -> bool:
+        return self.now[0]
+
+    def failure(self, world: World) -> str | None:
+        return self.now[1]
+
+
+@cache
+def episodes_sha256() -> str:
+    """Hash of the outcomes of all episodes of `PERIODS` answers, under all rules."""
+    told = [_outcome(answers, rules) for rules in RULES for answers in product(ANSWERS, repeat=PERIODS)]
+    return hashlib.sha256(json.dumps(told).encode()).hexdigest()[:12]
+
+
+def _outcome(answers: tuple[Answer, ...], rules: Rules) -> list[Any]:
+    """Outcome and reason after each period, and after the time for which a reached goal has to last."""
+    scenario, clock = Scripted(), SimpleNamespace(time=0.0)
+    episode = Episode(scenario, cast(World, clock), (PERIODS - 1) * Loop.PERIOD, rules)
+    found: list[Any] = []
+    for scenario.now in answers:
+        clock.time += Loop.PERIOD
+        found.append([episode.judge(), episode.reason])
+    return [*found, *([episode.settled()] if episode.outcome else [])]
