@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from scengen import list_tasks, load_task
-from scengen.evidence import rules
+from scengen.episode import Episode
+from scengen.evidence import comparison, episodes, rules
 from scengen.evidence.behaviour import FORMAT, SEED, Behaviour, asked, is_core, packed, unpacked
 from scengen.evidence.comparison import compare, merged, same_machine
 from scengen.evidence.edges import Edge
@@ -189,6 +190,32 @@ def test_a_shortcut_that_reaches_the_goal_is_another_verdict(task, monkeypatch):
     monkeypatch.setattr(DominoSingle, "shortcuts", solved)
     found = compare(task, stored(task.name), lambda name: name.startswith("shortcut") and not name.endswith("raw"))
     assert ("shortcut", "version") in kinds(found)
+
+
+def test_another_controller_on_the_same_machine_is_noticed(task, monkeypatch):
+    """The fingerprint is that of machine and controller together: a change of one must not pass for the other."""
+    before = stored(task.name)
+    if not same_machine(before):
+        pytest.skip("another machine than that of the file: bits are not compared")
+    monkeypatch.setattr(comparison, "fingerprint", lambda: "0" * 16)
+    assert ("controller", "bits") in kinds(compare(task, before, nothing))
+
+
+def test_another_order_of_rules_is_noticed(monkeypatch):
+    judge = Episode.judge
+
+    def goal_first(self):
+        if self.outcome is None and self.scenario.success(self.world):
+            monkeypatch.setattr(self.scenario, "now", (True, None))
+        return judge(self)
+
+    episodes.episodes_sha256.cache_clear()
+    before = episodes.episodes_sha256()
+    monkeypatch.setattr(Episode, "judge", goal_first)
+    episodes.episodes_sha256.cache_clear()
+    assert episodes.episodes_sha256() != before
+    episodes.episodes_sha256.cache_clear()
+    assert before == stored("domino_single").declared["episodes"]
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------
