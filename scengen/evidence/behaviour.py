@@ -16,6 +16,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import yaml
 from llvmlite import binding
 from numpy.typing import NDArray
 
@@ -29,6 +30,8 @@ from ..samplers.task import Draw, Task
 from ..scenario import Plan, Scenario
 from ..sim import scene_text
 from ..sim.world import World
+from ..task_files import facts_file
+from ..task_files import tasks as known_tasks
 from ..validate.identity import source_sha256
 from ..validate.rebuilt import portable_sha256
 from ..versions import versions
@@ -36,7 +39,7 @@ from . import edges, rules
 from .episodes import episodes_sha256
 from .rollouts import Stage
 
-FORMAT = 2
+FORMAT = 3
 """Format of a behaviour file, which includes the rollouts and states of which it consists."""
 SEED = 7
 """Seed of the draws."""
@@ -72,7 +75,7 @@ class Behaviour:
     states: Sequence[Mapping[str, Any]]
     """Stored states and what the rules say of them, of other contacts, and of random changes."""
     limits: Sequence[Any]
-    """Limits of the rules: state, coordinate, magnitude, answers before and after."""
+    """Limits of the rules: state, coordinate, magnitude, answers before and after, hash of what events write there."""
     rollouts: Mapping[str, Sequence[Any]]
     """Verdict, time [s] and bits of each rollout, see `rollouts.Played`."""
 
@@ -121,6 +124,8 @@ def declared(task: Task) -> dict[str, Any]:
         "embodiment": task.embodiment,
         "robot": robot_sha256(task.embodiment),
         "episodes": episodes_sha256(),
+        "answer": _answer(task),
+        "questions": _questions(task.name),
         "hold": family.HOLD,
         "moving": list(family.MOVING),
         "disturbed": list(family.DISTURBED),
@@ -137,6 +142,25 @@ def declared(task: Task) -> dict[str, Any]:
         for name, dist in axis.replace.items():
             found[f"{axis.name} {name}"] = [*quantiles(dist), axis.severities, axis.limits.get(name)]
     return found
+
+
+def _answer(task: Task) -> list[Any]:
+    """Number of values that a guess may take, the first and the last one, and the tries; empty without an answer."""
+    answer = task.nominal.answer()
+    if answer is None:
+        return []
+    return [
+        len(answer.candidates),
+        *map(_rounded, answer.candidates[:: max(1, len(answer.candidates) - 1)]),
+        answer.tries,
+    ]
+
+
+def _questions(task: str) -> str:
+    """Hash of the questions and sub-goals of a task; empty if it has none."""
+    path = facts_file(task) if task in known_tasks() else None
+    told = yaml.safe_load(path.read_text()) if path else ""
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12] if path else ""
 
 
 QUANTILES = (1e-9, 0.25, 0.5, 0.75, 1.0 - 1e-9)
@@ -242,9 +266,10 @@ def asked(stage: Stage, stored: Behaviour) -> dict[str, Any]:
     probes = [rules.Probe(scenario, world, unpacked(each["state"])) for each in stored.states]
     states = [_answers(probe, k, along, contacts, book, stored.states[k]["state"]) for k, probe in enumerate(probes)]
     limits = []
-    for state, text, magnitude, _, _ in stored.limits:
-        sides = probes[state].around(rules.Coordinate.parse(text), magnitude)
-        limits.append([state, text, magnitude, *(book.numbers(side) for side in sides)])
+    for state, text, magnitude, *_ in stored.limits:
+        probe, along_one = probes[state], rules.Coordinate.parse(text)
+        sides = [book.numbers(side) for side in probe.around(along_one, magnitude)]
+        limits.append([state, text, magnitude, *sides, probe.numbers_around(along_one, magnitude)])
     return {"answers": book.answers, "states": states, "limits": limits}
 
 
@@ -259,7 +284,7 @@ def _answers(
     """What the rules say of a stored state and its surroundings."""
     return {
         "answers": book.numbers(probe.answers()),
-        "numbers": probe.numbers,
+        "numbers": probe.numbers(),
         "contacts": list(rules.under_contacts(probe, contacts)),
         "mixed": list(rules.under_mixtures(probe, number, along, contacts)),
         "state": state,
@@ -281,7 +306,8 @@ def explored(stage: Stage, states: Sequence[NDArray[np.float64]]) -> dict[str, A
             counts[kind] = counts.get(kind, 0) + 1
             if counts[kind] <= rules.MAX_LIMITS:
                 numbers = book.numbers(limit.before), book.numbers(limit.after)
-                limits.append([number, str(limit.coordinate), limit.magnitude, *numbers])
+                around = probe.numbers_around(limit.coordinate, limit.magnitude)
+                limits.append([number, str(limit.coordinate), limit.magnitude, *numbers, around])
     plain = [[contact.table, contact.a, contact.b] for contact in contacts]
     return {"answers": book.answers, "contacts": plain, "states": described_states, "limits": limits}
 

@@ -185,8 +185,11 @@ def _rules(task: str, stored: Behaviour, now: Mapping[str, Any]) -> Iterator[Dif
             yield Difference(task, "events", f"state {number}, numbers", was["numbers"], here["numbers"], "version")
     for was, here in zip(stored.limits, now["limits"], strict=True):
         state, coordinate, magnitude = was[:3]
+        if was[5] != here[5]:
+            what = f"numbers around {magnitude:g} along {coordinate} in state {state}"
+            yield Difference(task, "events", what, was[5], here[5], "version")
         for part, kind in enumerate(RULES):
-            told = [" / ".join(now["answers"][side[part]] for side in limit[3:]) for limit in (was, here)]
+            told = [" / ".join(now["answers"][side[part]] for side in limit[3:5]) for limit in (was, here)]
             if told[0] != told[1]:
                 what = f"limit at {magnitude:g} along {coordinate} in state {state}"
                 yield Difference(task, kind, what, told[0], told[1], "version")

@@ -130,14 +130,19 @@ class Probe:
         done += [f"told {np.sign(arm.told).astype(int).tolist()}" for arm in world.partners]
         return ", ".join(done)
 
-    @property
-    def numbers(self) -> str:
-        """Hash of the numbers that events write in the state as it is, to six digits."""
-        self.answers()
+    def numbers(self, *changes: Mapping[Coordinate, float]) -> str:
+        """Hash of the numbers that events write after each of some changes of the state, to six digits."""
+        return _hash("\n".join(map(self._numbers, changes or [{}])))
+
+    def numbers_around(self, coordinate: Coordinate, magnitude: float) -> str:
+        """Those just below a magnitude of a change, and just above it."""
+        return self.numbers(*({coordinate: magnitude * (1.0 + side)} for side in (-MARGIN, MARGIN)))
+
+    def _numbers(self, changes: Mapping[Coordinate, float]) -> str:
+        self.answers(changes)
         parts = [getattr(self.world.data, name).ravel() for name in ("userdata", *EFFECTS)]
         parts += [np.asarray(arm.told) for arm in self.world.partners]
-        text = " ".join(f"{value:.6g}" if abs(value) > 1e-9 else "0" for part in parts for value in part)
-        return _hash(text)
+        return " ".join(f"{value:.6g}" if abs(value) > 1e-9 else "0" for part in parts for value in part)
 
 
 FIELDS = ("qpos", "qvel", "userdata", "ctrl", "mocap_pos", "mocap_quat", "xfrc_applied")

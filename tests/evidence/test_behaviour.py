@@ -238,7 +238,7 @@ def test_a_limit_is_between_the_places_at_which_the_rules_are_asked(task):
     before = stored(task.name)
     stage = Stage(task.draw("id", SEED, 0).scenario, task.embodiment, task.horizon)
     assert before.limits
-    for state, text, magnitude, low, high in before.limits:
+    for state, text, magnitude, low, high, _ in before.limits:
         probe = rules.Probe(stage.scenario, stage.world, unpacked(before.states[state]["state"]))
         sides = probe.around(rules.Coordinate.parse(text), magnitude)
         assert [list(side) for side in sides] == [[before.answers[k] for k in each] for each in (low, high)]
