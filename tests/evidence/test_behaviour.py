@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import of_stored_pools
 
 from scengen import list_tasks, load_task
 from scengen.episode import Episode
@@ -43,6 +44,7 @@ def cheats(task, monkeypatch):
     return {name: (hand.plan, hand.raw) for name, hand in import_module(f"hands.{task}").HANDS.items()}
 
 
+@of_stored_pools
 @pytest.mark.parametrize("task", list_tasks())
 def test_a_task_behaves_as_it_is_stored(task, monkeypatch):
     known = cheats(task, monkeypatch)

@@ -1,4 +1,4 @@
-"""A certificate expires when anything changes that it depends on, in whatever package, and at nothing else."""
+"""The hash of a family's code changes with anything that its certificates depend on, and with nothing else."""
 
 import shutil
 import subprocess
