@@ -22,7 +22,7 @@ from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
 from ..validate.certify import Trial
-from ..validate.claims import wrong_names
+from ..validate.claims import wrong_hashes, wrong_names
 from ..validate.recheck import BEFORE_WITNESS, WITH_WITNESS
 from ..validate.rollout import replay
 from ..validate.settings import CertifySettings
@@ -83,7 +83,7 @@ class Judge:
     def __call__(self, row: PoolRow) -> Judgement:
         try:
             scenario = self.task.scenario(row.params)
-            if wrong := list(wrong_names(row, scenario)):
+            if wrong := [*wrong_names(row, scenario), *wrong_hashes(row)]:
                 return lost(row, f"{wrong[0]}; see scengen verify")
             return self._judged(row, scenario)
         except (ScengenError, ValueError, TypeError, KeyError, ArithmeticError, RecursionError) as error:

@@ -79,7 +79,7 @@ GENERATE = ("generate", "task=domino_single")
         ((*GENERATE, "task.horizon=-1"), "it must be a positive number of seconds"),
         ((*GENERATE, "split=a=b"), "'split=a=b' is not an override"),
         ((*GENERATE, "--workers=2"), "'--workers=2' is not an option"),
-        (("verify",), "verify needs either pool="),
+        (("verify",), "verify needs pool="),
         (("verify", "pool=nowhere"), "no pool at nowhere"),
         (("show", "pool=nowhere"), "no pool at nowhere"),
         (("export", "pool=nowhere", "to=x"), "no pool at nowhere"),

@@ -81,7 +81,7 @@ def test_behind_the_middle_of_the_wall_the_robot_may_not_touch_the_ball(beyond, 
     mujoco.mj_kinematics(world.model, world.data)
     mujoco.mj_comPos(world.model, world.data)
     assert PLAIN.failure(world) is None
-    robot, ball = (world._label(name) for name in (ROBOT, "ball"))
+    robot, ball = (world.row(name) for name in (ROBOT, "ball"))
     world.loop.touching[robot, ball] = True
     assert PLAIN.failure(world) == ("the robot touched the ball behind the wall" if lost else None)
 
