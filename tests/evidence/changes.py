@@ -20,14 +20,19 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import changes_below
+import changes_rules
 import changes_tasks
-import refactorings_below
-import refactorings_tasks
+import refactorings_ground
+import refactorings_moves
+import refactorings_tasks_a_to_k
+import refactorings_tasks_l_to_z
 from edit import ROOT, Edit, StaleEdit, apply, copied
 
+REFACTORINGS = (refactorings_ground, refactorings_moves, refactorings_tasks_a_to_k, refactorings_tasks_l_to_z)
+CHANGES = (changes_below, changes_rules, changes_tasks)
 LISTS: dict[str, tuple[Edit, ...]] = {
-    "refactorings": (*refactorings_below.EDITS, *refactorings_tasks.EDITS),
-    "changes": (*changes_below.EDITS, *changes_tasks.EDITS),
+    "refactorings": tuple(edit for part in REFACTORINGS for edit in part.EDITS),
+    "changes": tuple(edit for part in CHANGES for edit in part.EDITS),
 }
 """All edits by kind."""
 ORDER = ("bits", "verdicts", "no")
