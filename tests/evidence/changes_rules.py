@@ -40,7 +40,7 @@ EDITS = (
         "time_of_release",
         ("balance_hard",),
         ((BALANCE, "RELEASE_TIME = 0.1\n", "RELEASE_TIME = 0.102\n"),),
-        RULE,
+        EVENT,
     ),
     Edit(
         "strict_rule_removed",
@@ -71,7 +71,7 @@ EDITS = (
         "distance_of_waiting",
         ("linear_intercept",),
         ((LINEAR, "NEAR_DISTANCE = 0.15 ", "NEAR_DISTANCE = 0.153 "),),
-        EVENT,
+        ("constraint", *EVENT),
     ),
     Edit(
         "height_of_success",
@@ -79,18 +79,25 @@ EDITS = (
         ((MIRROR, "LIFT_HEIGHT = 0.04\n", "LIFT_HEIGHT = 0.0408\n"),),
         RULE,
     ),
-    Edit("height_of_an_event", ("pick_place_ycb",), ((YCB, "MIN_LIFT = 0.03 ", "MIN_LIFT = 0.0306 "),), EVENT),
+    Edit(
+        "height_of_an_event",
+        ("pick_place_ycb",),
+        ((YCB, "MIN_LIFT = 0.03 ", "MIN_LIFT = 0.0306 "),),
+        EVENT,
+        misjudged="other bits alone: the object must be lifted and the contact with the table removed, both at once",
+    ),
     Edit(
         "distance_of_an_event",
         ("pick_place_ycb",),
         ((YCB, "self.spots[jumps][:2]) <= self.near:", "self.spots[jumps][:2]) <= 1.02 * self.near:"),),
         EVENT,
+        misjudged="other bits alone: no change along one axis brings the object to the square",
     ),
     Edit(
         "place_of_a_jump",
         ("pick_place_ycb",),
         ((YCB, "ends = found[-1] + jump.way *", "ends = found[-1] + 1.02 * jump.way *"),),
-        EVENT,
+        ("constraint", *EVENT),
     ),
     Edit(
         "no_jam",
@@ -103,6 +110,7 @@ EDITS = (
         ("slip_recovery",),
         ((SLIP, "world.time + self.planned[slips].seconds", "world.time + 1.02 * self.planned[slips].seconds"),),
         EVENT,
+        misjudged="no state just before a slip is stored, and rounding to a control period hides the rest",
     ),
     Edit(
         "height_of_carrying",
@@ -120,13 +128,14 @@ EDITS = (
         "speed_of_a_launch",
         ("linear_intercept",),
         ((LINEAR, 'world.launch("ball", self.speed * self.u,', 'world.launch("ball", 1.02 * self.speed * self.u,'),),
-        EVENT,
+        ("oracle", *EVENT),
     ),
     Edit(
         "start_of_a_swing",
         ("pendulum_grasp",),
         ((PENDULUM, "world.spin(HINGE, math", "world.spin(HINGE, 1.02 * math"),),
         EVENT,
+        misjudged="other bits alone: the state at time 0 is not stored",
     ),
     Edit(
         "pending_event",
@@ -181,6 +190,7 @@ EDITS = (
         ("ball_cage_escape",),
         ((CAGE, "SHAKE_TILT = math.radians(6.5)", "SHAKE_TILT = math.radians(6.63)"),),
         RULE,
+        misjudged="cage and ball must be turned together",
     ),
     Edit(
         "end_of_a_cage",
@@ -205,6 +215,7 @@ EDITS = (
         ("cube_toss",),
         ((TOSS, "self.bearing) * math.radians(self.rate))", "self.bearing) * math.radians(1.02 * self.rate))"),),
         EVENT,
+        misjudged="core rollouts and stored states are of the first training draw",
     ),
     Edit(
         "rule_of_an_axis_alone",
@@ -217,5 +228,6 @@ EDITS = (
             ),
         ),
         RULE,
+        misjudged="core rollouts and stored states are of the first training draw",
     ),
 )

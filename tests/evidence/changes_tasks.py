@@ -117,6 +117,7 @@ EDITS = (
         ("mirror_pick_place",),
         ((MIRROR, "MIN_PICTURE_OFFSET = 0.12\n", "MIN_PICTURE_OFFSET = 0.1224\n"),),
         ("constraint",),
+        misjudged="two parameters must change at once, and no stored proposal is refuted for this reason",
     ),
     Edit(
         "constraint_of_a_reach",
@@ -172,17 +173,20 @@ EDITS = (
         ("pendulum_grasp",),
         ((PENDULUM, ".tolist()), act, right, tries=1)", ".tolist()), act, right, tries=3)"),),
         DECLARED,
+        misjudged="answer() is not observed",
     ),
     Edit(
         "plan_of_a_step",
         ("domino_single",),
         ((DOMINO, "self.topple(world, self.count // 2)", "self.topple(world, 1)"),),
         DECLARED,
+        misjudged="of steps() the names alone are observed",
     ),
     Edit(
         "question_about_the_scene",
         ("domino_single",),
         (("conf/facts/domino_single.yaml", "in the chain, without the slab?", "in the chain, with the slab?"),),
         DECLARED,
+        misjudged="conf/facts is not observed",
     ),
 )

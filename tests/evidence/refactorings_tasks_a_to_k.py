@@ -198,6 +198,7 @@ EDITS = (
         "domino_whole_number_for_a_real_one",
         ("domino_single",),
         (("conf/task/domino_single.yaml", "[choice, 0.0, 90.0]", "[choice, 0, 90]"),),
+        misjudged="distributions are declared as the repr of a dataclass",
     ),
     Edit(
         "domino_spots_by_comprehension",

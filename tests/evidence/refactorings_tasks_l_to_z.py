@@ -60,6 +60,7 @@ EDITS = (
                 '            "grasp": lambda world: grasp(world.arm),\n',
             ),
         ),
+        misjudged="steps are declared as a list",
     ),
     Edit(
         "sort_success_as_loop",
@@ -109,6 +110,7 @@ EDITS = (
                 '        return "lifted_" + cube',
             ),
         ),
+        misjudged="flags in the memory are tried at negative values, which no episode reaches",
     ),
     Edit(
         "occluder_build_without_iterator",
