@@ -128,7 +128,7 @@ EDITS = (
         "speed_of_a_launch",
         ("linear_intercept",),
         ((LINEAR, 'world.launch("ball", self.speed * self.u,', 'world.launch("ball", 1.02 * self.speed * self.u,'),),
-        ("oracle", *EVENT),
+        ("idle", "jitter", "noise", "oracle", "shortcut", *EVENT),
     ),
     Edit(
         "start_of_a_swing",
