@@ -94,12 +94,13 @@ def line(edit: Edit, result: dict[str, Any], right: bool) -> str:
     else:
         kinds = {name: sorted({kind for kind, _, _ in each["differences"]}) for name, each in result.items()}
         told = "; ".join(f"{name}: {each['reproduces']} {kinds[name] or ''}".strip() for name, each in result.items())
-    verdict = "right" if right else "misjudged" if edit.misjudged else "WRONG"
+    verdict = "ERROR" if "error" in result else "right" if right else "misjudged" if edit.misjudged else "WRONG"
     return f"{verdict:9} {edit.name}: {told}"
 
 
-def run(kind: str, edits: Sequence[Edit]) -> Iterator[tuple[Edit, bool]]:
-    """Apply edits one after the other, print a line about each, and yield whether it was judged rightly."""
+def run(kind: str, edits: Sequence[Edit]) -> Iterator[tuple[Edit, bool | None]]:
+    """Apply edits one after the other, print a line about each, and yield whether it was judged rightly: None after an
+    error."""
     target = ROOT / "generated" / "changes.jsonl"
     with target.open("a") as file:
         for edit in edits:
@@ -113,7 +114,7 @@ def run(kind: str, edits: Sequence[Edit]) -> Iterator[tuple[Edit, bool]]:
             file.write(json.dumps(row) + "\n")
             file.flush()
             print(line(edit, result, right), flush=True)
-            yield edit, right
+            yield edit, None if "error" in result else right
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -125,10 +126,10 @@ def main(arguments: Sequence[str]) -> int:
     wrong = 0
     for kind in kinds:
         found = list(run(kind, [edit for edit in LISTS[kind] if not names or edit.name in names]))
-        amiss = [edit.name for edit, right in found if right == bool(edit.misjudged)]
+        amiss = [edit.name for edit, right in found if right is None or right == bool(edit.misjudged)]
         wrong += len(amiss)
-        marked = sum(bool(edit.misjudged) and not right for edit, right in found)
-        told = f"{sum(right for _, right in found)} of {len(found)} {kind} are judged rightly"
+        marked = sum(bool(edit.misjudged) and right is False for edit, right in found)
+        told = f"{sum(bool(right) for _, right in found)} of {len(found)} {kind} are judged rightly"
         print(f"{told}, {marked} wrongly as their marks say{', otherwise: ' if amiss else ''}{', '.join(amiss)}")
     return min(wrong, 1)
 
