@@ -40,12 +40,13 @@ ORDER = ("bits", "verdicts", "no")
 TIME_LIMIT = 600
 """Time after which a comparison is ended [s]: a changed plan may not end by itself."""
 JUDGE = """
-import json, sys
+import json, pathlib, sys
 from scengen import load_task
-from scengen.evidence.behaviour import Behaviour, path_of
+from scengen.evidence.behaviour import Behaviour
 from scengen.evidence.comparison import compare
 for name in sys.argv[1:]:
-    found = compare(load_task(name), Behaviour.read(path_of(name)))
+    stored = pathlib.Path("conf", "behaviour", f"{name}.json")
+    found = compare(load_task(name), Behaviour.read(stored))
     told = [[each.kind, each.level, str(each)] for each in found.differences]
     print(json.dumps([name, found.reproduces, told]), flush=True)
 """
