@@ -173,7 +173,6 @@ EDITS = (
         ("pendulum_grasp",),
         ((PENDULUM, ".tolist()), act, right, tries=1)", ".tolist()), act, right, tries=3)"),),
         DECLARED,
-        misjudged="answer() is not observed",
     ),
     Edit(
         "plan_of_a_step",
@@ -187,6 +186,5 @@ EDITS = (
         ("domino_single",),
         (("conf/facts/domino_single.yaml", "in the chain, without the slab?", "in the chain, with the slab?"),),
         DECLARED,
-        misjudged="conf/facts is not observed",
     ),
 )

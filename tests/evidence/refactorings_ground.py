@@ -248,6 +248,5 @@ EDITS = (
             ("scengen/samplers/designs.py", "        return len(dist.options)", "        return len(dist.listed)"),
             ("scengen/samplers/axis.py", "for v in dist.options]", "for v in dist.listed]"),
         ),
-        misjudged="distributions are declared as the repr of a dataclass",
     ),
 )

@@ -14,31 +14,6 @@ YCB = "pick_place_ycb"
 
 EDITS = (
     Edit(
-        "extract_setpoint_of_go_to",
-        (MIRROR, "domino_single"),
-        (
-            (
-                MOTION,
-                "        ahead = goal - setpoint\n        distance = math.sqrt(ahead @ ahead)\n"
-                "        speed = min(pace.speed, 4.0 * distance)\n"
-                "        velocity = ahead * (speed / distance) if distance > 1e-9 else np.zeros(3)\n"
-                "        setpoint = setpoint + velocity * Loop.PERIOD\n        if not manner",
-                "        distance, velocity = _towards(goal, setpoint, pace.speed)\n"
-                "        setpoint = setpoint + velocity * Loop.PERIOD\n        if not manner",
-            ),
-            (
-                MOTION,
-                "def _touching(arm: Arm) -> str:",
-                "def _towards(goal: Vec3, setpoint: Vec3, limit: float) -> tuple[float, Vec3]:\n"
-                '    """Distance to a goal [m] and velocity towards it [m/s], which falls near it."""\n'
-                "    ahead = goal - setpoint\n    distance = math.sqrt(ahead @ ahead)\n"
-                "    if distance <= 1e-9:\n        return distance, np.zeros(3)\n"
-                "    return distance, ahead * (min(4.0 * distance, limit) / distance)\n\n\n"
-                "def _touching(arm: Arm) -> str:",
-            ),
-        ),
-    ),
-    Edit(
         "facing_down_by_columns",
         (MIRROR, "domino_single"),
         (

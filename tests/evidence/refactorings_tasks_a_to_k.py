@@ -31,19 +31,6 @@ EDITS = (
         ),
     ),
     Edit(
-        "balance_events_with_early_exit",
-        ("balance_hard",),
-        (
-            (
-                BALANCE,
-                '        world.memory["alone"] = world.memory["alone"] + Loop.PERIOD if alone else 0.0',
-                "        if alone:\n"
-                '            world.memory["alone"] = Loop.PERIOD + world.memory["alone"]\n        else:\n'
-                '            world.memory["alone"] = 0.0',
-            ),
-        ),
-    ),
-    Edit(
         "balance_rename_private_plans",
         ("balance_hard",),
         (
@@ -198,7 +185,6 @@ EDITS = (
         "domino_whole_number_for_a_real_one",
         ("domino_single",),
         (("conf/task/domino_single.yaml", "[choice, 0.0, 90.0]", "[choice, 0, 90]"),),
-        misjudged="distributions are declared as the repr of a dataclass",
     ),
     Edit(
         "domino_spots_by_comprehension",
@@ -236,23 +222,5 @@ EDITS = (
             ),
             (RAMP, "        if along > 0.0 and touching:\n", "        if touching and 0.0 < along:\n"),
         ),
-    ),
-    Edit(
-        "rename_memory",
-        ("balance_hard",),
-        (
-            (BALANCE, '        remember(scene, "alone")', '        remember(scene, "free_time")'),
-            (
-                BALANCE,
-                '        return world.memory["alone"] >= RELEASE_TIME',
-                '        return world.memory["free_time"] >= RELEASE_TIME',
-            ),
-            (
-                BALANCE,
-                '        world.memory["alone"] = world.memory["alone"] + Loop.PERIOD if alone else 0.0',
-                '        world.memory["free_time"] = world.memory["free_time"] + Loop.PERIOD if alone else 0.0',
-            ),
-        ),
-        misjudged="the text of the scene and the answers of the rules contain the names of the memory",
     ),
 )

@@ -60,7 +60,6 @@ EDITS = (
                 '            "grasp": lambda world: grasp(world.arm),\n',
             ),
         ),
-        misjudged="steps are declared as a list",
     ),
     Edit(
         "sort_success_as_loop",
@@ -260,25 +259,6 @@ EDITS = (
                 "        between = bool(2 * abs(offset[0]) < TRAY.width and 2 * abs(offset[1]) < TRAY.length)\n",
             ),
         ),
-    ),
-    Edit(
-        "rename_class_of_family",
-        ("mirror_pick_place",),
-        (
-            (MIRROR, "class MirrorPickPlace(Scenario):", "class CubeInMirror(Scenario):"),
-            (
-                "conf/task/mirror_pick_place.yaml",
-                "family: scengen.tasks.mirror_pick_place.MirrorPickPlace",
-                "family: scengen.tasks.mirror_pick_place.CubeInMirror",
-            ),
-        ),
-        misjudged="ids of scenarios are hashes of the dotted name of the family",
-    ),
-    Edit(
-        "reword_reason_of_failure",
-        ("mirror_pick_place",),
-        ((MIRROR, 'return "the cube fell off the table"', 'return "the cube has fallen off the table"'),),
-        misjudged="verdicts and answers of the rules contain the words of a reason",
     ),
     Edit(
         "exchange_two_constraints",
