@@ -30,6 +30,8 @@ class Edit:
     """Kinds of differences of which each task must report at least one; empty for a refactoring."""
     least: str = "version"
     """Least level of such a difference, `version` or `bits`."""
+    longer: bool = False
+    """Whether all rollouts of all splits are played, as before a release, and not only those of every change."""
     rounds: bool = False
     """Whether a refactoring may change the last bits."""
     misjudged: str = ""
