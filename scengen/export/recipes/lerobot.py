@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import BadConfig
+from ...robots.files import INSTALL
 from ..dataset import Recording
 from ..streams import ENVIRONMENT
 from .settings import EPISODES, SMOKE_BATCHES, RecipeSettings, Scripts, script
@@ -188,7 +189,8 @@ def _requirements(order: Order) -> str:
         f"# {order.settings.train}: Python 3.12 or newer, in an environment of its own, without robosuite\n"
         f"lerobot[{order.recipe.extras}]=={LEROBOT}\n"
         "scengen\n"
-        "# From a checkout of scengen, for lerobot-eval: pip install integrations/lerobot_env_scengen\n"
+        f"# For lerobot-eval, the robot's files: {INSTALL}\n"
+        "# and, from a checkout of scengen: pip install integrations/lerobot_env_scengen\n"
     )
 
 
