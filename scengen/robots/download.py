@@ -23,8 +23,10 @@ def main() -> int:
             print(f"downloading robosuite {ROBOSUITE} (157 MB)", file=sys.stderr)
             fill(folder)
         print(f"the robot's files are in {folder}")
-        if (used := files.place()).folder != folder:
-            print(f"but {used.told} comes first; to use the cache, set {files.VARIABLE}={folder}")
+        if not complete((used := files.place()).folder):
+            print(
+                f"but {used.told}, which is not complete, comes first; to use the cache, set {files.VARIABLE}={folder}"
+            )
     except NoRobot as error:
         print(error, file=sys.stderr)
         return 2

@@ -1,5 +1,6 @@
 """The robot's files are found in three ways, compared with the release, and missed in one line."""
 
+import os
 import subprocess
 import sys
 import zipfile
@@ -160,11 +161,9 @@ def test_physics_alone_need_no_visual_mesh(alone, here, tmp_path, monkeypatch):
         loaded(visual=True)
 
 
-def test_an_import_and_a_command_without_a_robot_do_not_need_it(tmp_path):
-    program = "from scengen import cli, World; import sys; sys.exit(cli.run(sys.argv[1:]))"
-    line = [sys.executable, "-c", program, "tasks", "task=domino_single"]
-    variables = {"PATH": "", files.VARIABLE: str(tmp_path / "gone"), "PYTHONPATH": ":".join(sys.path)}
-    ended = subprocess.run(line, env=variables, capture_output=True, text=True)
+def test_an_import_does_not_need_the_robot(tmp_path):
+    line = [sys.executable, "-c", "from scengen.robots import ik, suction; from scengen.sim import world"]
+    ended = subprocess.run(line, env={**os.environ, files.VARIABLE: str(tmp_path / "gone")}, capture_output=True)
     assert ended.returncode == 0, ended.stderr
 
 
