@@ -4,7 +4,7 @@
 set -eu
 unset PYTHONPATH
 PATH="$PWD/env/bin:$PATH"
-size=$(wc -c < scengen-*.whl)
+size=$(cat scengen-*.whl | wc -c)
 if [ "$size" -ge 3000000 ] || python -m zipfile -l scengen-*.whl | grep -E '\.(stl|obj) '; then
     echo "the wheel has $size bytes; it must have less than 3 MB, and no meshes" >&2
     exit 1
