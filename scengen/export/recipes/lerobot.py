@@ -186,7 +186,7 @@ def _check(order: Order) -> None:
 
 def _requirements(order: Order) -> str:
     return (
-        f"# {order.settings.train}: Python 3.12 or newer, in an environment of its own, without robosuite\n"
+        f"# {order.settings.train}: Python 3.12 or newer, in an environment without robosuite's requirements\n"
         f"lerobot[{order.recipe.extras}]=={LEROBOT}\n"
         "scengen\n"
         f"# For lerobot-eval, the robot's files: {INSTALL}\n"
