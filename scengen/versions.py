@@ -12,7 +12,7 @@ ROBOSUITE = "1.5.2"
 def versions() -> dict[str, str]:
     """Versions of every package that the physics depends on, and the platform.
 
-    robosuite's is that of the robot's files (`robots.panda.ASSETS`), whether or not robosuite is installed.
+    robosuite's is that of the robot's files (`robots.files`), whether or not robosuite is installed.
     """
     scengen, mujoco, numpy = (importlib.metadata.version(package) for package in ("scengen", "mujoco", "numpy"))
     packages = {"scengen": scengen, "mujoco": mujoco, "robosuite": ROBOSUITE, "numpy": numpy}

@@ -10,7 +10,7 @@ import pytest
 import scengen
 
 LAYERS = (
-    ("errors", "statistics", "geometry", "certificate", "versions", "compat"),
+    ("errors", "statistics", "geometry", "certificate", "versions", "cache", "compat"),
     ("orientation", "params", "physics", "symmetry", "task_files", "typed"),
     ("robots",),
     ("control",),

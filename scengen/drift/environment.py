@@ -22,9 +22,10 @@ from typing import Any
 
 from filelock import FileLock
 
+from ..cache import cache_folder
 from ..control import native
 from ..errors import BadConfig, ScengenError, cut, nearest
-from ..work.targets import cache_folder, refused
+from ..work.targets import refused
 
 READY = "ready"
 """Name of the file that is written last. An environment without it is unfinished and is made again."""

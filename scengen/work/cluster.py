@@ -18,11 +18,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import TextIO, TypeVar
 
+from ..cache import cache_folder
 from ..errors import BadConfig, cut
 from .crew import Crew
 from .nodes import ClusterError, code_sha256, one_line
 from .parallel import Limits
-from .targets import cache_folder, refused
+from .targets import refused
 
 log = logging.getLogger("scengen.cluster")
 

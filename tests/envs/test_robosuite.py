@@ -10,7 +10,7 @@ from unittest import mock
 import mujoco
 import numpy as np
 import pytest
-from helpers import REFERENCE, pictures_are_possible
+from helpers import REFERENCE, needs_robosuite, pictures_are_possible
 from pools import certificate_of
 
 from scengen import list_tasks, load_task
@@ -32,8 +32,9 @@ from scengen.validate.certify import Certified
 from scengen.validate.rebuilt import rebuild
 from scengen.versions import versions
 
-robosuite = pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+needs_robosuite()
 # ruff: noqa: E402
+import robosuite
 from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
 from robosuite.wrappers import DataCollectionWrapper, GymWrapper, VisualizationWrapper
 

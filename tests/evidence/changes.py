@@ -26,7 +26,9 @@ import refactorings_ground
 import refactorings_moves
 import refactorings_tasks_a_to_k
 import refactorings_tasks_l_to_z
-from edit import ROOT, Edit, StaleEdit, apply, copied
+from edit import ROBOT, ROOT, Edit, StaleEdit, apply, copied
+
+from scengen.robots import files
 
 REFACTORINGS = (refactorings_ground, refactorings_moves, refactorings_tasks_a_to_k, refactorings_tasks_l_to_z)
 CHANGES = (changes_below, changes_rules, changes_tasks)
@@ -64,7 +66,7 @@ def compared(edit: Edit) -> dict[str, Any]:
     with copied() as tree:
         apply(edit, tree)
         command = [sys.executable, "-c", JUDGE, "longer" if edit.longer else "core", *edit.tasks]
-        variables = {**os.environ, "PYTHONPATH": str(tree)}
+        variables = {**os.environ, "PYTHONPATH": str(tree), files.VARIABLE: str(tree / ROBOT)}
         try:
             done = subprocess.run(command, cwd=tree, env=variables, capture_output=True, text=True, timeout=TIME_LIMIT)
         except subprocess.TimeoutExpired:

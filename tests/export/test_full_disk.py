@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from helpers import REFERENCE
+from helpers import REFERENCE, needs_robosuite
 
 from scengen.pool import Pool
 
@@ -36,7 +36,7 @@ def limited(command, kilobytes, to):
 @pytest.mark.slow
 def test_a_file_that_cannot_grow_is_one_line_and_leaves_nothing(tmp_path, name):
     if name == "record robomimic":
-        pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+        needs_robosuite()
     command, kilobytes = COMMANDS[name]
     status, told = limited(command, kilobytes, tmp_path / "new")
     lines = [line for line in told.splitlines() if not line.startswith(("verify ", "export ", "record "))]
