@@ -13,7 +13,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(ENV)
 	@sh tools/install.sh $(BIN)/python
 	@sh tools/opengl.sh
-	$(BIN)/python -c "from scengen.fingerprint import fingerprint; fingerprint()"  # compiles the control loop
+	$(BIN)/python -c "from scengen.work.fingerprint import fingerprint; fingerprint()"  # compiles the control loop
 	@touch $(READY)
 
 demo: setup

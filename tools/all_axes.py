@@ -13,16 +13,17 @@ from typing import Any
 import axis_records
 import predictors
 
-from scengen import cli, list_tasks, load_task, task_files
-from scengen.analysis.distance import Energy
+from scengen import cli, list_tasks, load_task
+from scengen.evaluate.statistics import Rate
 from scengen.evidence import ledger
 from scengen.evidence.ledger import Evidence
+from scengen.ood.analysis.distance import Energy
 from scengen.ood.baseline import BELIEF, INCONCLUSIVE, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline, verdict
 from scengen.ood.behaviour import HELD_OUT
 from scengen.ood.belief import moves_hidden
+from scengen.samplers import task_files
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
-from scengen.statistics import Rate
 from scengen.validate.certify import lower_bound
 
 PAGE = Path(__file__).parent.parent / "docs" / "axes.md"

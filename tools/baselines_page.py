@@ -29,12 +29,12 @@ from baselines import (
 )
 
 from scengen import list_tasks, load_task
+from scengen.evaluate.statistics import paired, rate
 from scengen.evidence import ledger
 from scengen.evidence.ledger import Evidence
 from scengen.learn.models import BC, MIP
 from scengen.learn.train import TrainSettings
 from scengen.samplers.split import ID
-from scengen.statistics import paired, rate
 
 PAGE = Path("docs/baselines.md")
 SHOWN = (*POLICIES, REPLAY)

@@ -8,9 +8,10 @@ from hydra import initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.plugins.completion_plugin import DefaultCompletionPlugin
 
-from .. import compose, task_files
+from .. import compose
 from ..errors import ScengenError
 from ..pool import Pool
+from ..samplers import task_files
 
 BASH = r"""
 _scengen() {

@@ -163,7 +163,7 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     if verb not in (*VERBS, *COMPLETING):
         raise BadConfig(f"no command named {cut(repr(verb))}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
 
-    from ..task_files import ORIGINS
+    from ..samplers.task_files import ORIGINS
     from .usage import usage
 
     if {"-h", "--help"} & set(arguments) and verb in VERBS:
@@ -171,8 +171,8 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
         return OK
 
     # These modules take seconds to import on a busy machine; nothing above needs them.
-    from ..commands import out
     from ..control import compilation, native
+    from .commands import out
     from .completion import BASH, completions
 
     compilation.announce()
@@ -193,7 +193,7 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     if flags:
         known = "settings are key=value, options --help, --cfg job and --info " + "|".join(ORIGINS)
         raise BadConfig(f"{cut(repr(flags[0]))} is not an option; {known}; see scengen {verb} --help")
-    command = import_module(f"scengen.commands.{verb}").command
+    command = import_module(f"scengen.cli.commands.{verb}").command
     if signals:
         signals.working = True
     return command(arguments)
@@ -213,7 +213,7 @@ SHOW_OPTIONS = {"-c": "--cfg", "--cfg": "--cfg", "-i": "--info", "--info": "--in
 def _show(verb: str, arguments: Sequence[str]) -> int:
     """Print the configuration of a command, or its origin: `--cfg job`, `--info defaults`."""
     from .. import compose
-    from ..commands import out
+    from .commands import out
 
     words = list(arguments)
     place = next(i for i, word in enumerate(words) if word.startswith("-"))
@@ -276,7 +276,7 @@ def _write_traceback(error: BaseException) -> str:
 
 def _help() -> str:
     """The commands by purpose, each with the docstring of its module."""
-    folder = Path(__file__).parents[1] / "commands"
+    folder = Path(__file__).parent / "commands"
     lines = ["scengen: physical puzzles for robot manipulation, each verified to be solvable", ""]
     lines += ["usage: scengen COMMAND [key=value ...]      settings of a command: scengen COMMAND --help", ""]
     for purpose, verbs in GROUPS.items():

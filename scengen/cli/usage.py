@@ -6,8 +6,8 @@ from typing import Any
 
 import yaml
 
-from .. import task_files
 from ..errors import BadConfig
+from ..samplers import task_files
 
 WIDTH = 118
 """Largest length of a line [characters]."""

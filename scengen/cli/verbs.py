@@ -9,7 +9,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "Evaluate and analyse": ("evaluate", "edition", "agent", "power", "audit", "compare", "subset", "shrink", "bench"),
     "Extend": ("new", "asset", "probe", "discover"),
 }
-"""Commands by purpose. Each is a module of `scengen.commands` and a file in conf/command."""
+"""Commands by purpose. Each is a module of `scengen.cli.commands` and a file in conf/command."""
 VERBS = tuple(verb for verbs in GROUPS.values() for verb in verbs)
 """Names of all commands."""
 RENAMED: Mapping[str, str] = {"axis": "probe", "bias": "audit", "card": "publish", "robosuite": "crosscheck"}

@@ -15,7 +15,7 @@ from ..episode import Episode
 from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..validate.rebuilt import world_of
-from ..validate.stored import task_of_manifest
+from ..validate.verify.stored import task_of_manifest
 from .environment import answer
 
 PERIODS = 5

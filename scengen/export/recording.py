@@ -31,10 +31,10 @@ from ..pictures.video import check_size
 from ..pool import collection
 from ..pool.demonstrations import demonstration_folders, is_demonstrations
 from ..pool.row import DemonstrationRow
-from ..settings import at_least
 from ..sim.world import World
 from ..validate.playable import stored_world, unplayable
 from ..versions import versions
+from ..work.limits import at_least
 from ..work.parallel import Workers
 from ..work.targets import appearing, check_unfinished, try_file, try_folder
 from .cameras import calibration

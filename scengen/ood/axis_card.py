@@ -6,14 +6,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ..analysis.distance import Energy
 from ..errors import BadConfig, UnknownName, cut
+from ..evaluate.statistics import Rate
 from ..samplers.axis import Proof
 from ..samplers.task import Task
-from ..settings import at_least
-from ..statistics import Rate
+from ..work.limits import at_least
 from ..work.parallel import Workers
 from . import behaviour, boundary, features
+from .analysis.distance import Energy
 from .baseline import Baseline
 
 FORMAT = 3

@@ -10,9 +10,9 @@ from pools import make, rewritten
 from scipy import stats
 
 from scengen import cli, load_task
-from scengen.analysis.bias import acceptance_map, bias
-from scengen.analysis.redraw import redrawn
 from scengen.errors import BadConfig, PoolError
+from scengen.ood.analysis.bias import acceptance_map, bias
+from scengen.ood.analysis.redraw import redrawn
 from scengen.params import values
 from scengen.pool import Pool
 from scengen.samplers.split import ID

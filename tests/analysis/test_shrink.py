@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scengen import cli, load_task
-from scengen.analysis.shrink import centre, shrink
 from scengen.errors import BadConfig
+from scengen.ood.analysis.shrink import centre, shrink
 
 NAMES = [f"p{i}" for i in range(12)]
 MIDDLE = dict.fromkeys(NAMES, 0.0)

@@ -114,7 +114,7 @@ def _command(*command: str) -> Checker:
 
     def run(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
         from scengen import cli
-        from scengen.commands import export
+        from scengen.cli.commands import export
         from scengen.validate import playable
         from scengen.work.parallel import Limits
 

@@ -16,11 +16,11 @@ import pytest
 from helpers import REFERENCE
 from pools import QUICKLY, make
 
-from scengen import cli, list_tasks, load_task, task_files
+from scengen import cli, list_tasks, load_task
 from scengen.cli import program
+from scengen.cli.commands.settings import read
 from scengen.cli.completion import completions
 from scengen.cli.verbs import RENAMED
-from scengen.commands.settings import read
 from scengen.demos.generate import DemosSettings
 from scengen.errors import BadConfig
 from scengen.evaluate.settings import EvaluateSettings
@@ -31,6 +31,7 @@ from scengen.ood.discovery import search as discovery
 from scengen.pictures import film, render
 from scengen.pool import Pool
 from scengen.runs import generate
+from scengen.samplers import task_files
 from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.validate.settings import QUICK
@@ -98,7 +99,7 @@ def test_bad_input_ends_in_one_clear_line_and_status_2(capsys, argv, says):
 def test_an_old_name_runs_the_new_command_and_says_so(capsys, monkeypatch, old, new):
     run = []
     monkeypatch.setattr(
-        import_module(f"scengen.commands.{new}"), "command", lambda arguments: run.append(arguments) or 0
+        import_module(f"scengen.cli.commands.{new}"), "command", lambda arguments: run.append(arguments) or 0
     )
     status, err = said(capsys, old, "pool=here")
     assert status == 0 and run == [["pool=here"]]
@@ -162,7 +163,7 @@ def test_an_interrupted_command_says_whether_it_will_continue(capsys, monkeypatc
     def interrupted(arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(import_module(f"scengen.commands.{verb}"), "command", interrupted)
+    monkeypatch.setattr(import_module(f"scengen.cli.commands.{verb}"), "command", interrupted)
     status, text = said(capsys, verb)
     head = (task_files.conf_dir() / "command" / f"{verb}.yaml").read_text().split("# Example")[0]
     continues = "to continue" in head
@@ -345,7 +346,7 @@ def test_every_task_file_is_found_without_registration():
 
 
 def test_a_run_that_fails_says_why_while_it_fails_and_when_it_is_interrupted(monkeypatch, capsys, tmp_path):
-    run = importlib.import_module("scengen.commands.generate")
+    run = importlib.import_module("scengen.cli.commands.generate")
     notes = []
 
     def fails(task, certify_settings, settings, progress):
@@ -387,7 +388,7 @@ def test_a_remedy_can_be_followed(tmp_path, capsys):
 
 
 def test_a_shortcut_that_never_rests_gets_a_remedy(monkeypatch, capsys, tmp_path):
-    import scengen.commands.generate as command
+    import scengen.cli.commands.generate as command
 
     def rejected(task, certify_settings, settings, progress):
         pool = Pool.open("generated/reference")

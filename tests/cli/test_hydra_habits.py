@@ -10,13 +10,14 @@ import yaml
 from helpers import REFERENCE
 from pools import QUICKLY
 
-from scengen import cli, compose, task_files
+from scengen import cli, compose
+from scengen.cli.commands import generate
+from scengen.cli.commands.settings import read_task
 from scengen.cli.completion import BASH, completions
 from scengen.cli.usage import usage
-from scengen.commands import generate
-from scengen.commands.settings import read_task
 from scengen.errors import BadConfig
 from scengen.pool import Pool
+from scengen.samplers import task_files
 
 DOMINO = "task=domino_single"
 

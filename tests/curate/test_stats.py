@@ -11,10 +11,10 @@ import yaml
 from helpers import REFERENCE
 
 from scengen import cli, list_tasks
-from scengen.curate.stats import PHASES, at_phases, paths_of, statistics_of
+from scengen.demos.curate.stats import PHASES, at_phases, paths_of, statistics_of
 from scengen.errors import BadConfig, PoolError
 from scengen.export.dataset import Recording
-from scengen.task_files import conf_dir, paper_lengths
+from scengen.samplers.task_files import conf_dir, paper_lengths
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from pools import make
 
 from scengen import cli, list_tasks, load_task
 from scengen.certificate import CHECKS
-from scengen.commands import bench, drift
+from scengen.cli.commands import bench, drift
 from scengen.drift import environment as environments
 from scengen.drift.environment import Environment, environment
 from scengen.drift.judge import Judge, judge
@@ -21,10 +21,10 @@ from scengen.drift.matrix import cell, flips, matrix, remarks, tables, under
 from scengen.drift.tracks import in_words, parted, track
 from scengen.errors import BadConfig, ScengenError
 from scengen.evidence import ledger
-from scengen.fingerprint import fingerprint
 from scengen.pool.files import sha256
-from scengen.validate.recheck import BEFORE_WITNESS, WITH_WITNESS
-from scengen.validate.stored import settings_of_manifest
+from scengen.validate.verify.recheck import BEFORE_WITNESS, WITH_WITNESS
+from scengen.validate.verify.stored import settings_of_manifest
+from scengen.work.fingerprint import fingerprint
 from scengen.work.parallel import Limits
 
 ROOT = Path(__file__).parents[2]

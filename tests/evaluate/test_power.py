@@ -12,7 +12,7 @@ from scipy.stats import beta, norm
 from scengen import cli
 from scengen.errors import BadConfig
 from scengen.evaluate.power import PowerAnalysis, seeds_for
-from scengen.statistics import correlation, difference, paired, rate
+from scengen.evaluate.statistics import correlation, difference, paired, rate
 
 
 def textbook(p, q, significance=0.05, power=0.8):

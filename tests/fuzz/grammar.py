@@ -4,7 +4,8 @@ import random
 import re
 from pathlib import Path
 
-from scengen import cli, task_files
+from scengen import cli
+from scengen.samplers import task_files
 
 LONG = 10_000
 """Letters of the longest names."""

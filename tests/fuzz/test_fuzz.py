@@ -64,7 +64,7 @@ def test_what_nobody_thought_of_is_one_line_and_a_file(monkeypatch, capsys, tmp_
         raise error
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr("scengen.commands.power.command", fail)
+    monkeypatch.setattr("scengen.cli.commands.power.command", fail)
     assert cli.run(["power"]) == 2
     told = capsys.readouterr().err
     (file,) = tmp_path.iterdir()
@@ -77,7 +77,7 @@ def test_what_nobody_thought_of_is_one_line_and_a_file(monkeypatch, capsys, tmp_
 def test_text_of_a_pool_is_shown_and_not_obeyed(capsys):
     from rich.table import Table
 
-    from scengen.commands import out, say, warn
+    from scengen.cli.commands import out, say, warn
 
     hostile = "[/] [bold]x[/bold] \x1b]0;title\x07 \u202e :smile: a\nb"
     table = Table(hostile, title=hostile)

@@ -10,12 +10,12 @@ import pytest
 from helpers import REFERENCE
 
 from scengen import cli
-from scengen.commands import BAD_INPUT, FAILED, OK
+from scengen.cli.commands import BAD_INPUT, FAILED, OK
+from scengen.demos.teleop.pad import read_events
 from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations, write_demonstrations
 from scengen.pool.files import sha256
 from scengen.scenario import Strict
 from scengen.tasks.domino_single import DominoSingle
-from scengen.teleop.pad import read_events
 
 
 def teleop(folder, *given, **changed):
