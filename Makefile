@@ -118,7 +118,7 @@ INTEGRATIONS ?=
 integrations: setup
 	$(BIN)/python tools/check_integrations.py $(INTEGRATIONS)
 
-# Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen probe, and names of tasks to select them.
+# Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen axis card, and names of tasks to select them.
 AXES ?= n=50
 axes: setup
 	$(BIN)/python tools/all_axes.py $(AXES)

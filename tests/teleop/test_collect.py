@@ -21,7 +21,7 @@ from scengen.tasks.domino_single import DominoSingle
 def teleop(folder, *given, **changed):
     """Drive `domino_single` with a program; return the exit status."""
     asked = {"task": "domino_single", "device": "pads:Domino", "n": 3, "operator": "op7", **changed, "to": folder}
-    return cli.run(["teleop", *(f"{name}={value}" for name, value in asked.items() if value is not None), *given])
+    return cli.run(["demos", "pad", *(f"{name}={value}" for name, value in asked.items() if value is not None), *given])
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_driven_verified_recorded_curated(made, tmp_path, capsys):
     assert table["scengen/operator"].to_pylist() == ["op7"] * 3
     assert cli.run(["curate", f"data={data}"]) == OK
     assert json.loads((data / "curation" / "kept.json").read_text()) == [0, 1, 2]
-    assert cli.run(["stats", f"data={data}"]) == OK
+    assert cli.run(["curate", "stats", f"data={data}"]) == OK
 
 
 @pytest.mark.slow

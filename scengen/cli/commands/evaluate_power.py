@@ -13,7 +13,7 @@ from .settings import read
 
 @dataclass(frozen=True)
 class PowerSettings:
-    """Settings of `scengen power`; conf/command/power.yaml explains them."""
+    """Settings of `scengen evaluate power`; conf/command/evaluate_power.yaml explains them."""
 
     seeds: int
     rollouts: int
@@ -28,7 +28,7 @@ class PowerSettings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("power", arguments, PowerSettings)
+    settings = read("evaluate power", arguments, PowerSettings)
     if not 0 < settings.success <= 1:
         raise BadConfig(f"success = {settings.success:g}; it must lie in (0, 1]")
     if settings.drop is not None and not 0 < settings.drop <= settings.success:

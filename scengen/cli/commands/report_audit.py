@@ -18,14 +18,14 @@ from .settings import read
 
 @dataclass(frozen=True)
 class AuditSettings:
-    """Settings of `scengen audit`; conf/command/audit.yaml explains them."""
+    """Settings of `scengen report audit`; conf/command/report_audit.yaml explains them."""
 
     pool: str | list[str]
     json: str | None
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("audit", arguments, AuditSettings)
+    settings = read("report audit", arguments, AuditSettings)
     try_file(settings.json)
     pool = filled(one(settings.pool))
     with ProgressBar(err, f"draw {pool.folder} again", min(pool.manifest.indices, MAX_REDRAWN)) as progress_bar:

@@ -25,7 +25,7 @@ MAX_FAULT = 300
 
 @dataclass(frozen=True)
 class PublishSettings:
-    """Settings of `scengen publish`; conf/command/publish.yaml explains them."""
+    """Settings of `scengen export hub`; conf/command/export_hub.yaml explains them."""
 
     pool: str | list[str]
     to: str
@@ -37,7 +37,7 @@ class PublishSettings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("publish", without_expired(arguments), PublishSettings)
+    settings = read("export hub", without_expired(arguments), PublishSettings)
     if settings.level not in LEVELS:
         raise BadConfig(f"level = {settings.level}; it must be {' or '.join(LEVELS)}")
     at_least(settings, workers=1, sample=1)

@@ -18,7 +18,7 @@ from .settings import read
 
 @dataclass(frozen=True)
 class CrosscheckSettings:
-    """Settings of `scengen crosscheck`; conf/command/crosscheck.yaml explains them."""
+    """Settings of `scengen verify robosuite`; conf/command/verify_robosuite.yaml explains them."""
 
     pool: str | list[str]
     first: int | None
@@ -36,7 +36,7 @@ class CrosscheckSettings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("crosscheck", arguments, CrosscheckSettings)
+    settings = read("verify robosuite", arguments, CrosscheckSettings)
     settings.check()
     try_file(settings.json)
     pools = [Pool.open(folder) for folder in several(settings.pool)]

@@ -9,7 +9,7 @@ from .settings import read
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("recipe", arguments, RecipeSettings)
+    settings = read("export recipe", arguments, RecipeSettings)
     scripts = write_recipe(settings)
     say(f"wrote {settings.to}: {', '.join(scripts.files)}. {scripts.origin}")
     say(f"next, {scripts.install}")

@@ -16,7 +16,7 @@ from .settings import read_task
 
 
 def command(arguments: Arguments) -> int:
-    settings, task, checks = read_task("discover", arguments, DiscoverSettings)
+    settings, task, checks = read_task("axis discover", arguments, DiscoverSettings)
     at_least(settings, budget=MIN_BUDGET, seed=0, workers=1)
     if settings.method not in METHODS:
         raise UnknownName("method", settings.method, METHODS)
@@ -31,7 +31,7 @@ def command(arguments: Arguments) -> int:
     out.print(_table(task.name, search))
     say("trials: " + ", ".join(f"{count} {what}" for what, count in search.spent.items()))
     write(folder / "axes.yaml", search.as_yaml(task))
-    say(f"wrote {folder / 'axes.yaml'}: copy useful axes into the task file, and evaluate them with scengen probe")
+    say(f"wrote {folder / 'axes.yaml'}: copy useful axes into the task file, and evaluate them with scengen axis card")
     return OK
 
 

@@ -34,7 +34,7 @@ MAX_STRIP_PIXELS = 100_000_000
 
 @dataclass(frozen=True)
 class FilmSettings:
-    """Settings of `scengen film`; conf/command/film.yaml explains them."""
+    """Settings of `scengen show film`; conf/command/show_film.yaml explains them."""
 
     pool: str | list[str] | None
     id: str | None
@@ -57,7 +57,7 @@ class FilmSettings:
     def check(self) -> None:
         """Raise `BadConfig` for settings that are not valid."""
         if (self.hit is None) == (self.id is None) or (self.hit is None and self.pool is None):
-            raise BadConfig("film needs either pool=FOLDER and id=ID, or hit=FILE; see scengen film --help")
+            raise BadConfig("film needs either pool=FOLDER and id=ID, or hit=FILE; see scengen show film --help")
         if Path(self.to).suffix not in (".png", ".mp4"):
             raise BadConfig(f"to = {self.to}; give a .png file for a film strip or an .mp4 file for a video")
         if self.raw and self.of == WITNESS:
@@ -78,7 +78,7 @@ def check_format(target: Path, frames: int, fps: int, width: int, height: int) -
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("film", arguments, FilmSettings)
+    settings = read("show film", arguments, FilmSettings)
     settings.check()
     try_file(settings.to)
     check_pictures()

@@ -14,7 +14,7 @@ from .settings import read_task
 
 
 def command(arguments: Arguments) -> int:
-    settings, task, certify_settings = read_task("probe", arguments, AxisSettings)
+    settings, task, certify_settings = read_task("axis card", arguments, AxisSettings)
     settings.check(task)
     folder = Path(settings.to or f"generated/axes/{task.name}-{settings.axis}")
     try_folder(folder)

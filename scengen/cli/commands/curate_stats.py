@@ -24,7 +24,7 @@ MAX_WAYS = 5
 
 @dataclass(frozen=True)
 class StatsSettings:
-    """Settings of `scengen stats`; conf/command/stats.yaml explains them."""
+    """Settings of `scengen curate stats`; conf/command/curate_stats.yaml explains them."""
 
     data: str | list[str]
     to: str | None
@@ -32,7 +32,7 @@ class StatsSettings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("stats", arguments, StatsSettings)
+    settings = read("curate stats", arguments, StatsSettings)
     if settings.to is not None and Path(settings.to).suffix != ".html":
         raise BadConfig(f"to = {settings.to}; give an .html file")
     try_file(settings.to)

@@ -30,7 +30,7 @@ from .settings import read
 
 @dataclass(frozen=True)
 class CompareSettings:
-    """Settings of `scengen compare`; conf/command/compare.yaml explains them."""
+    """Settings of `scengen report compare`; conf/command/report_compare.yaml explains them."""
 
     pool: str | list[str]
     within: float
@@ -39,7 +39,7 @@ class CompareSettings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("compare", arguments, CompareSettings)
+    settings = read("report compare", arguments, CompareSettings)
     try_file(settings.json)
     at_least(settings, permutations=1)
     if not 0 < settings.within <= 1000:

@@ -24,7 +24,7 @@ from .settings import read_task
 
 @dataclass(frozen=True)
 class ShrinkSettings:
-    """Settings of `scengen shrink`; conf/command/shrink.yaml explains them."""
+    """Settings of `scengen axis shrink`; conf/command/axis_shrink.yaml explains them."""
 
     split: str
     sampler: str
@@ -34,7 +34,7 @@ class ShrinkSettings:
 
 
 def command(arguments: Arguments) -> int:
-    settings, task, certify_settings = read_task("shrink", arguments, ShrinkSettings)
+    settings, task, certify_settings = read_task("axis shrink", arguments, ShrinkSettings)
     at_least(settings, seed=0, index=0)
     try_file(settings.json)
     scenario = _scenario(task, settings)

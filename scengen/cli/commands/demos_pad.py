@@ -23,7 +23,7 @@ from .settings import read, task_overrides
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("teleop", arguments, TeleopSettings)
+    settings = read("demos pad", arguments, TeleopSettings)
     settings.check()
     source = _source(settings, arguments)
     shown = settings.view if settings.view is not None else settings.device in (GAMEPAD, KEYBOARD) and _display()
@@ -51,9 +51,9 @@ def _source(settings: TeleopSettings, arguments: Arguments) -> Source:
     Raises:
         ScengenError: neither or both are given, or one of them cannot be read.
     """
-    name = compose.chosen_task("teleop", arguments)
+    name = compose.chosen_task("demos pad", arguments)
     if (name is None) == (settings.pool is None):
-        raise BadConfig("teleop needs either task=NAME or pool=FOLDER; see scengen teleop --help")
+        raise BadConfig("teleop needs either task=NAME or pool=FOLDER; see scengen demos pad --help")
     if name is not None:
         if settings.id is not None:
             raise BadConfig(f"id = {settings.id} names a scenario of a pool; give pool=FOLDER, or index= with task=")

@@ -12,7 +12,7 @@ from .settings import read
 
 @dataclass(frozen=True)
 class ViewSettings:
-    """Settings of `scengen view`; conf/command/view.yaml explains them."""
+    """Settings of `scengen show view`; conf/command/show_view.yaml explains them."""
 
     pool: str | list[str]
     id: str
@@ -20,7 +20,7 @@ class ViewSettings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("view", arguments, ViewSettings)
+    settings = read("show view", arguments, ViewSettings)
     pool = holder(settings.pool, settings.id)
     row = chosen(pool, settings.id)
     scenario = task_of(pool, search_path(arguments)).scenario(row.params)

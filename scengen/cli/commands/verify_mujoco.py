@@ -25,7 +25,7 @@ TRACKS = "scengen.drift.tracks"
 
 @dataclass(frozen=True)
 class DriftSettings:
-    """Settings of `scengen drift`; conf/command/drift.yaml explains them."""
+    """Settings of `scengen verify mujoco`; conf/command/verify_mujoco.yaml explains them."""
 
     pool: str | list[str]
     mujoco: str | list[str]
@@ -38,7 +38,7 @@ class DriftSettings:
 
 
 def command(arguments: Arguments) -> int:
-    settings = read("drift", arguments, DriftSettings)
+    settings = read("verify mujoco", arguments, DriftSettings)
     if settings.level not in LEVELS:
         raise BadConfig(f"level = {settings.level}; it must be {', '.join(LEVELS[:-1])} or {LEVELS[-1]}")
     at_least(settings, n=1, workers=1, limit_seconds=1, limit_mb=200)
