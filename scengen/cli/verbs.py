@@ -30,8 +30,8 @@ VERBS = tuple(
     for verb in COMMANDS
     for words in (*([] if verb in ONLY_FORMS else [(verb,)]), *((verb, form) for form in FORMS.get(verb, ())))
 )
-"""Names of all commands and their forms. Each is a module of `scengen.cli.commands` and a file in conf/command, with `_`
-for the space."""
+"""Names of all commands and forms. Each is a module of `scengen.cli.commands` and a file in conf/command, with `_` for
+the space."""
 RENAMED: Mapping[str, str] = {
     "crosscheck": "verify robosuite",
     "drift": "verify mujoco",
