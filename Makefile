@@ -13,7 +13,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(ENV)
 	@sh tools/install.sh $(BIN)/python
 	@sh tools/opengl.sh
-	$(BIN)/python -c "from scengen.fingerprint import fingerprint; fingerprint()"  # compiles the control loop
+	$(BIN)/python -c "from scengen.work.fingerprint import fingerprint; fingerprint()"  # compiles the control loop
 	@touch $(READY)
 
 demo: setup
@@ -118,7 +118,7 @@ INTEGRATIONS ?=
 integrations: setup
 	$(BIN)/python tools/check_integrations.py $(INTEGRATIONS)
 
-# Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen probe, and names of tasks to select them.
+# Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen axis card, and names of tasks to select them.
 AXES ?= n=50
 axes: setup
 	$(BIN)/python tools/all_axes.py $(AXES)

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from .params import param
     from .pool import Pool
     from .samplers.task import Draw, Task
+    from .samplers.task_files import tasks as list_tasks
     from .scenario import Scenario, Shortcut
     from .sim.world import World
-    from .task_files import tasks as list_tasks
     from .validate.certify import certify
     from .validate.rollout import replay, run
 
@@ -59,7 +59,7 @@ _HOME = {
     "Task": ("samplers.task", "Task"),
     "World": ("sim.world", "World"),
     "certify": ("validate.certify", "certify"),
-    "list_tasks": ("task_files", "tasks"),
+    "list_tasks": ("samplers.task_files", "tasks"),
     "load_task": ("compose", "load_task"),
     "param": ("params", "param"),
     "replay": ("validate.rollout", "replay"),

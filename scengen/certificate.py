@@ -120,7 +120,7 @@ class StoredCertificate:
     final_state: str
     """Hash of the physics state at the end of the witness."""
     fingerprint: str
-    """Fingerprint of the machine's rounding, see `scengen.fingerprint`."""
+    """Fingerprint of the machine's rounding, see `scengen.work.fingerprint`."""
     task_version: int
     """Version of the task on which the certificate was made, see `Scenario.VERSION`."""
     source_sha256: str

@@ -1,7 +1,7 @@
 """Composition of settings by Hydra: the files in conf/ with the overrides of a command line, as plain data.
 
 Tasks are composed and loaded here, too. Each of Hydra's errors becomes one line with the nearest name or a remedy.
-`scengen.commands.settings` turns the composed data of a command into checked settings.
+`scengen.cli.commands.settings` turns the composed data of a command into checked settings.
 """
 
 import itertools
@@ -26,9 +26,19 @@ from omegaconf.errors import OmegaConfBaseException
 
 from .errors import BadConfig, UnknownName, cut
 from .samplers.task import Task, load
-from .task_files import ORIGINS, category, conf_dir, groups, is_folder, packages, search_path, tasks
-from .typed import typed
+from .samplers.task_files import (
+    ORIGINS,
+    category,
+    command_file,
+    conf_dir,
+    groups,
+    is_folder,
+    packages,
+    search_path,
+    tasks,
+)
 from .validate.settings import CertifySettings
+from .work.typed import typed
 
 # --- tasks ------------------------------------------------------------------------------------
 
@@ -145,7 +155,8 @@ def config_dir(verb: str) -> Path:
 
 def config_name(verb: str) -> str:
     """Name of the file of a command in its `config_dir`."""
-    return f"command/{verb}" if groups(verb) else verb
+    file = command_file(verb).stem
+    return f"command/{file}" if groups(verb) else file
 
 
 def as_yaml(verb: str, overrides: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from scengen.teleop.pad import PadEvent
+from scengen.demos.teleop.pad import PadEvent
 
 SLOW = 0.05
 """Distance from the target at which the stick begins to return to its rest [m]."""

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from scengen.commands.settings import read_task
+from scengen.cli.commands.settings import read_task
 from scengen.pool import Pool
 from scengen.pool.writing import write_pool
 from scengen.runs.generate import GenerateSettings, generate

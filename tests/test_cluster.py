@@ -16,8 +16,8 @@ import pytest
 from faults import lost, work
 
 from scengen import cli
-from scengen.commands.settings import read
-from scengen.commands.verify import VerifySettings
+from scengen.cli.commands.settings import read
+from scengen.cli.commands.verify import VerifySettings
 from scengen.errors import BadConfig, ScengenError
 from scengen.runs.progress import ProgressBar
 from scengen.work import crew

@@ -16,11 +16,11 @@ from scengen.attack.evidence import Hit
 from scengen.envs.gym import PoolEnv
 from scengen.episode import PAPER, STRICT, Episode
 from scengen.errors import UnknownName
-from scengen.fingerprint import fingerprint
 from scengen.pool import Pool
 from scengen.scenario import Scenario, Strict
 from scengen.sim.world import World
 from scengen.validate.rollout import replay, run
+from scengen.work.fingerprint import fingerprint
 
 BASE = Path(__file__).parent / "checker" / "base"
 POOLS = sorted(path.parent for path in BASE.glob("*/manifest.json") if re.search(r"_(id|paper)$", path.parent.name))

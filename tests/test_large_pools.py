@@ -15,12 +15,13 @@ from hypothesis import strategies as st
 from synthetic_pool import synthetic
 
 from scengen import cli
-from scengen.analysis import redraw
-from scengen.analysis.distance import MAX_PAIRS, near_duplicates
-from scengen.analysis.space import Batch
+from scengen.cli import sheet
+from scengen.cli import tables as report
 from scengen.envs.gym import PoolEnv
 from scengen.errors import PoolError
-from scengen.pictures import report, sheet
+from scengen.ood.analysis import redraw
+from scengen.ood.analysis.distance import MAX_PAIRS, near_duplicates
+from scengen.ood.analysis.space import Batch
 from scengen.pool import Pool, shards, writing
 from scengen.pool.directory import Directory
 from scengen.pool.library import Library

@@ -7,8 +7,8 @@ import pytest
 from helpers import REFERENCE
 
 from scengen import cli
-from scengen.commands import show
-from scengen.commands.settings import read
+from scengen.cli.commands import show
+from scengen.cli.commands.settings import read
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig
 from scengen.pool import Pool

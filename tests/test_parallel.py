@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 from faults import lost, work
 
-from scengen.commands.settings import read
-from scengen.commands.verify import VerifySettings
+from scengen.cli.commands.settings import read
+from scengen.cli.commands.verify import VerifySettings
 from scengen.errors import BadConfig
 from scengen.work import machine
 from scengen.work.machine import cores
@@ -113,7 +113,7 @@ def test_no_more_cores_are_used_than_a_container_is_given(quota, bound, told, tm
 
 
 def test_workers_auto_are_as_many_as_there_are_cores(monkeypatch):
-    monkeypatch.setattr("scengen.commands.settings.cores", lambda: 5)
+    monkeypatch.setattr("scengen.cli.commands.settings.cores", lambda: 5)
     assert read("verify", ["pool=x", "workers=auto"], VerifySettings).workers == 5
     with pytest.raises(BadConfig, match="workers = 'many'"):
         read("verify", ["pool=x", "workers=many"], VerifySettings)

@@ -13,16 +13,17 @@ from typing import Any
 import axis_records
 import predictors
 
-from scengen import cli, list_tasks, load_task, task_files
-from scengen.analysis.distance import Energy
+from scengen import cli, list_tasks, load_task
+from scengen.evaluate.statistics import Rate
 from scengen.evidence import ledger
 from scengen.evidence.ledger import Evidence
+from scengen.ood.analysis.distance import Energy
 from scengen.ood.baseline import BELIEF, INCONCLUSIVE, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline, verdict
 from scengen.ood.behaviour import HELD_OUT
 from scengen.ood.belief import moves_hidden
+from scengen.samplers import task_files
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
-from scengen.statistics import Rate
 from scengen.validate.certify import lower_bound
 
 PAGE = Path(__file__).parent.parent / "docs" / "axes.md"
@@ -43,8 +44,8 @@ measured on version N* says that there are none yet for the task as it is. The f
 {training}
 ## Axes
 
-Each line summarizes one axis card (`scengen probe`) and what else was tried on the axis; each column states its sample
-size. {verdicts}
+Each line summarizes one axis card (`scengen axis card`) and what else was tried on the axis; each column states its
+sample size. {verdicts}
 
 * **outside**: smallest gap between axis and training over the moved parameters [widths of the training range].
   **physics**: features declared by the family that leave training (sampled, 300 draws).

@@ -4,14 +4,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from scengen.evaluate.statistics import difference, paired, rate
 from scengen.evidence import ledger, measuring
 from scengen.evidence.ledger import Evidence
 from scengen.ood.axis_card import NOT_SEARCHED, read_card
 from scengen.ood.baseline import LEARNERS, Baseline
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
-from scengen.statistics import difference, paired, rate
-from scengen.typed import typed
+from scengen.work.typed import typed
 
 ROOT = Path(__file__).parent.parent
 MADE = ROOT / "generated" / "axes"

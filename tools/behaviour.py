@@ -29,7 +29,7 @@ from scengen.errors import ScengenError
 from scengen.evidence.behaviour import Behaviour, Cheat, made, observe
 from scengen.evidence.comparison import Compared, compare, merged
 from scengen.samplers.task import Task
-from scengen.task_files import behaviour_file
+from scengen.samplers.task_files import behaviour_file
 
 ROOT = Path(__file__).parent.parent
 

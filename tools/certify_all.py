@@ -7,7 +7,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
-from scengen import task_files
+from scengen.samplers import task_files
 
 POOLS = 2
 """Number of pools that are made at a time, each by one process: a pool of one scenario keeps one core busy."""

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from stacks import found_python
 
-from scengen.versions import ROBOSUITE
+from scengen.installation import ROBOSUITE
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build" / "integrations"

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from scengen import cli, list_tasks, load_task
-from scengen.analysis.leaks import SEARCH
 from scengen.evidence import ledger, measuring
 from scengen.evidence.ledger import Evidence
+from scengen.ood.analysis.leaks import SEARCH
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
 

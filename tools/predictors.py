@@ -15,9 +15,9 @@ import numpy as np
 from scipy.stats import mannwhitneyu, rankdata
 
 from scengen import list_tasks, load_task
+from scengen.evaluate.statistics import NORMAL_QUANTILE
 from scengen.evidence import ledger
 from scengen.ood.baseline import BELIEF, INCONCLUSIVE, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline, verdict
-from scengen.statistics import NORMAL_QUANTILE
 
 PAGE = Path(__file__).parent.parent / "docs" / "predictors.md"
 MIN_AXES = 60

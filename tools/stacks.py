@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from scengen.versions import ROBOSUITE
+from scengen.installation import ROBOSUITE
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build" / "stacks"

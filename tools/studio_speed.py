@@ -14,14 +14,14 @@ from pathlib import Path
 from browser import ARGUMENTS, PAD, installed
 from playwright.sync_api import Page, sync_playwright
 
-from scengen.analysis.redraw import task_of
-from scengen.commands.teleop import source_of_pool
+from scengen.cli.commands.demos_pad import source_of_pool
+from scengen.demos.teleop.collect import TeleopSettings
+from scengen.ood.analysis.redraw import task_of
 from scengen.pool import Pool
+from scengen.samplers.task_files import search_path
 from scengen.studio.app import Content, Studio
 from scengen.studio.browse import Shelf
 from scengen.studio.driving import Driver
-from scengen.task_files import search_path
-from scengen.teleop.collect import TeleopSettings
 
 HOST = "127.0.0.1"
 SIZE = (640, 480)

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from scengen.analysis.redraw import task_of
 from scengen.certificate import STAGES, Check
 from scengen.errors import Infeasible
+from scengen.ood.analysis.redraw import task_of
 from scengen.params import values
 from scengen.pool import Pool, PoolRow
 from scengen.pool.files import sha256

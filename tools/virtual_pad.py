@@ -17,10 +17,10 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 import pygame
 
 from scengen import load_task
-from scengen.teleop.drive import Timing, drive
-from scengen.teleop.pad import BUTTONS, STICKS, TRIGGERS
-from scengen.teleop.sdl import Gamepad
-from scengen.teleop.session import Session, Stage
+from scengen.demos.teleop.drive import Timing, drive
+from scengen.demos.teleop.pad import BUTTONS, STICKS, TRIGGERS
+from scengen.demos.teleop.sdl import Gamepad
+from scengen.demos.teleop.session import Session, Stage
 from scengen.validate.rebuilt import rebuild
 
 GAME_CONTROLLER = 1

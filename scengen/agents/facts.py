@@ -16,8 +16,8 @@ from ..errors import BadConfig, UnknownName, cut
 from ..geometry import DIRECTIONS
 from ..params import Value
 from ..samplers.task import Task
-from ..task_files import facts_file, tasks
-from ..typed import typed
+from ..samplers.task_files import facts_file, tasks
+from ..work.typed import typed
 from .order import Order, Subgoal
 
 KINDS = ("objects", "contacts", "reachability", "infeasibility", "hidden state", "causal precondition")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..evaluate.table import cells
-from ..pictures.report import template
+from ..pictures.page import template
 from ..work.targets import write
 from .calls import CALLS
 from .priors import Prior

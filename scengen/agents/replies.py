@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from ..errors import ScengenError, cut
-from ..typed import typed
+from ..work.typed import typed
 from .facts import Fact
 
 T = TypeVar("T")

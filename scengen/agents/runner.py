@@ -17,10 +17,10 @@ from ..errors import BadConfig, UnknownName, cut
 from ..pool import Pool, PoolRow, collection
 from ..samplers.split import ID
 from ..samplers.task import Task
-from ..settings import at_least
-from ..typed import typed
+from ..work.limits import at_least
 from ..work.log import Log
 from ..work.targets import try_folder, write
+from ..work.typed import typed
 from . import facts
 from .acting import MODES, SEE, act
 from .calls import CALLS, Budget, Calls, OutOfBudget, estimate

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..evaluate.statistics import Difference, Rate, mean_difference
 from ..evaluate.table import TableLine, cells, percent, table
 from ..samplers.split import ID
-from ..statistics import Difference, Rate, mean_difference
 from .grading import Grade
 from .priors import Prior
 from .questioning import UNDERSTAND, Result

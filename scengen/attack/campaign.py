@@ -14,12 +14,12 @@ from ..pool.files import sha256, why_not_plain
 from ..pool.names import Name
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
-from ..settings import at_least
 from ..sim.world import World
 from ..validate.identity import source_sha256
 from ..validate.playable import scene_errors
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
+from ..work.limits import at_least
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
 from ..work.targets import write

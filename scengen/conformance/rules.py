@@ -17,11 +17,12 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
-from .. import compose, task_files
+from .. import compose
 from ..errors import ScengenError
 from ..ood import axis_card, axis_evidence, features
 from ..ood.baseline import BELIEF, INCONCLUSIVE
 from ..params import canonical, values, with_values
+from ..samplers import task_files
 from ..samplers.split import ID
 from ..samplers.task import Task
 from ..scenario import Scenario

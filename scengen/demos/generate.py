@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..analysis.distance import NEAR_DUPLICATE_DISTANCE, near_duplicates
-from ..analysis.space import Batch
 from ..certificate import Check
 from ..errors import BadConfig, Infeasible, cut
+from ..ood.analysis.distance import NEAR_DUPLICATE_DISTANCE, near_duplicates
+from ..ood.analysis.space import Batch
 from ..pool import Pool, collection
 from ..pool.demonstrations import (
     DEMONSTRATIONS,
@@ -28,11 +28,11 @@ from ..runs.attempts import Progress, Wanted, extend, first_of, infeasible, reje
 from ..runs.journal import Journal, Record
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
-from ..settings import at_least
 from ..validate.certify import Trial
 from ..validate.labels import labels_of_draw, labels_of_task, made_with
 from ..validate.rollout import Rollout, run
 from ..validate.settings import CertifySettings
+from ..work.limits import at_least
 from ..work.parallel import Limits, Workers
 from .styles import NOMINAL, RECOVER, VARIED, check_styles, chosen, in_style
 

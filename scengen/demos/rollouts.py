@@ -20,7 +20,7 @@ from ..samplers.task import Task
 from ..validate.labels import made_with
 from ..validate.playable import stored_world
 from ..validate.rollout import replay
-from ..validate.stored import task_of_manifest
+from ..validate.verify.stored import task_of_manifest
 from .generate import FAILED, KEPT, DemosSummary, finish
 
 FOLDER = "rollouts"

@@ -9,7 +9,6 @@ import numpy as np
 from ..certificate import as_json
 from ..episode import check_rules
 from ..errors import Infeasible, PoolError, ScengenError
-from ..fingerprint import fingerprint
 from ..params import canonical
 from ..pool.demonstrations import DEMONSTRATIONS, POLICY, SCRIPTED, TELEOP, DemonstrationConfig, Demonstrations
 from ..pool.files import sha256
@@ -18,13 +17,14 @@ from ..samplers.split import Split
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
-from ..validate.claims import OfCode, comparable, passed_filter
-from ..validate.examine import Verdict
 from ..validate.identity import check_versions
 from ..validate.labels import labels_of_draw, labels_of_task
 from ..validate.rebuilt import difference, rebuild
 from ..validate.rollout import replay, run
-from ..validate.stored import task_of_manifest
+from ..validate.verify.claims import OfCode, comparable, passed_filter
+from ..validate.verify.examine import Verdict
+from ..validate.verify.stored import task_of_manifest
+from ..work.fingerprint import fingerprint
 from ..work.parallel import Limits, Workers, each
 from .styles import check_styles, chosen, in_style
 

@@ -22,9 +22,9 @@ from typing import Any
 
 from filelock import FileLock
 
-from ..cache import cache_folder
 from ..control import native
 from ..errors import BadConfig, ScengenError, cut, nearest
+from ..installation import cache_folder
 from ..work.targets import refused
 
 READY = "ready"

@@ -16,17 +16,17 @@ from .. import compose
 from ..attack.check import attacked
 from ..certificate import Check
 from ..errors import NoOracle, ScengenError
-from ..fingerprint import fingerprint
 from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
 from ..validate.certify import Trial
-from ..validate.claims import wrong_hashes, wrong_names
-from ..validate.recheck import BEFORE_WITNESS, WITH_WITNESS
 from ..validate.rollout import replay
 from ..validate.settings import CertifySettings
-from ..validate.stored import settings_of_manifest, task_of_manifest
+from ..validate.verify.claims import wrong_hashes, wrong_names
+from ..validate.verify.recheck import BEFORE_WITNESS, WITH_WITNESS
+from ..validate.verify.stored import settings_of_manifest, task_of_manifest
+from ..work.fingerprint import fingerprint
 from ..work.parallel import Limits, each
 from .environment import answer
 from .models import model_difference
@@ -159,7 +159,7 @@ def _compared(found: Sequence[Check], stored: Mapping[str, Check]) -> tuple[Repe
 
 
 def answers(request: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """The version and fingerprint of this process, then a judgement of every scenario; see `commands.drift`."""
+    """The version and fingerprint of this process, then a judgement of every scenario; see `commands.verify_mujoco`."""
     yield {"mujoco": mujoco.__version__, "fingerprint": fingerprint()}
     limits = Limits(request["limit_seconds"], request["limit_mb"])
     for folder in request["pools"]:

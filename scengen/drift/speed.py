@@ -11,8 +11,8 @@ from typing import Any
 import mujoco
 from rich.table import Table
 
-from ..evaluate.speed import PROMISES, core
-from ..evaluate.timing import Measure
+from ..bench.speed import PROMISES, core
+from ..bench.timing import Measure
 from .environment import Environment, answer
 
 MODULE = "scengen.drift.speed"

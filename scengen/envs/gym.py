@@ -18,7 +18,7 @@ from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import ArrayLike, NDArray
 
-from .. import compose, task_files
+from .. import compose
 from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import STRICT, Actions, Episode, Outcome, Rules, check_rules
@@ -29,6 +29,7 @@ from ..pictures.opengl import check_size
 from ..pictures.render import Camera
 from ..pool import PoolRow
 from ..pool.library import Library
+from ..samplers import task_files
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.embodiment import action_size, hands

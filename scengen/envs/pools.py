@@ -11,8 +11,8 @@ from ..pool.collection import members
 from ..pool.demonstrations import Demonstrations, is_demonstrations
 from ..pool.library import Library
 from ..pool.rows import AnyRow
-from ..task_files import tasks as known_tasks
-from ..task_files import version
+from ..samplers.task_files import tasks as known_tasks
+from ..samplers.task_files import version
 from ..validate.identity import check_versions
 
 Folders = str | Path | Sequence[str | Path]

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import compose, task_files
+from .. import compose
 from ..assets.prop import TABLE_HALF
 from ..control.loop import Loop
 from ..control.osc import CLOSED_JAW
@@ -29,6 +29,7 @@ from ..pool import PoolRow
 from ..pool.library import Library
 from ..pool.row import SceneRow
 from ..robots import panda
+from ..samplers import task_files
 from ..scenario import Scenario
 from ..sim.embodiment import JAW, SUCTION, action_size, all_hands, hands
 from ..sim.world import World

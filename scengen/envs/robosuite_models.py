@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ..compat import ROBOSUITE_RUNS
 from ..errors import ScengenError
+from ..installation import ROBOSUITE
 from ..robots import panda, suction
 from ..sim import scene_text
-from ..versions import ROBOSUITE
 
 REMEDY = "run pip install 'scengen[robosuite]', in an environment of its own"
 """Remedy for whatever keeps robosuite's environments from running."""

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
-from ..runs.edition import Edition
+from .edition import Edition
 from .rollouts import Evaluation
 from .settings import EvaluateSettings
 from .table import TableLine, cells, plain, table

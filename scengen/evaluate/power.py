@@ -9,13 +9,13 @@ from scipy import stats
 from scipy.special import ndtr
 
 from ..errors import BadConfig
-from ..settings import at_least
-from ..statistics import ORDERINGS
+from ..work.limits import at_least
+from .statistics import ORDERINGS
 
 EXPERIMENTS = 1000
 """Number of simulated experiments: a probability of 0.8 is accurate to 3 points at 95 % confidence."""
 MIN_IN_TAIL = 40
-"""Minimum number of the random orderings of a bound that lie beyond it (see `scengen.statistics.mean_interval`)."""
+"""Minimum number of the random orderings of a bound that lie beyond it, see `statistics.mean_interval`."""
 MAX_SCENARIOS = 1_000_000
 """Maximum number of scenarios in all experiments together; larger analyses have fewer experiments."""
 MAX_SIMULATED = 1000
@@ -40,7 +40,7 @@ class PowerAnalysis:
     """Number of rollouts of each scenario (the paper's K)."""
     correlation: float = 0.5
     """Intra-cluster correlation of the outcomes of one scenario: 0 if only noise decides, 1 if only the scenario does.
-    `scengen.statistics.correlation` measures it."""
+    `scengen.evaluate.statistics.correlation` measures it."""
     twins: float = 0.0
     """Correlation of the difficulties of an OOD scenario and its ID twin: the higher, the more pairing saves. At 0,
     both sides are compared as if they were unpaired."""

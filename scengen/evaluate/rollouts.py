@@ -16,7 +16,7 @@ from ..episode import Actions
 from ..errors import BadConfig, PoolError
 from ..pool import Pool
 from ..samplers.split import ID
-from ..task_files import about as about_task
+from ..samplers.task_files import about as about_task
 from ..validate.playable import unplayable
 from ..work.log import Log
 from ..work.machine import cores

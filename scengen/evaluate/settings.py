@@ -13,7 +13,7 @@ from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName, cut
 from ..learn.store import is_policy, read_settings
 from ..pool import collection
-from ..settings import at_least
+from ..work.limits import at_least
 from ..work.parallel import Workers
 from .policies import FULL_RATE_POLICIES
 from .remote.client import ClientSettings, address_of, is_address, read_client

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from ..samplers.split import ID
-from ..statistics import Difference, Rate, difference, mean_difference, mean_rate, paired, rate
+from .statistics import Difference, Rate, difference, mean_difference, mean_rate, paired, rate
 
 
 @dataclass(frozen=True)

@@ -22,19 +22,19 @@ from numpy.typing import NDArray
 
 from ..assets.prop import table
 from ..errors import Infeasible, PoolError
-from ..fingerprint import fingerprint
+from ..installation import versions
 from ..params import parameters
 from ..samplers.dists import Dist
 from ..samplers.split import ID
 from ..samplers.task import Draw, Task
+from ..samplers.task_files import facts_file
+from ..samplers.task_files import tasks as known_tasks
 from ..scenario import Plan, Scenario
 from ..sim import scene_text
 from ..sim.world import World
-from ..task_files import facts_file
-from ..task_files import tasks as known_tasks
 from ..validate.identity import source_sha256
 from ..validate.rebuilt import portable_sha256
-from ..versions import versions
+from ..work.fingerprint import fingerprint
 from . import edges, rules
 from .episodes import episodes_sha256
 from .rollouts import Stage

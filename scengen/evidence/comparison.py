@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from ..errors import Infeasible
-from ..fingerprint import fingerprint
+from ..installation import versions
 from ..samplers.split import ID
 from ..samplers.task import Task
-from ..versions import versions
+from ..work.fingerprint import fingerprint
 from .behaviour import (
     SEED,
     TRAINING_DRAWS,

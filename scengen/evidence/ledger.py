@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from .. import task_files
 from ..errors import BadConfig, cut
+from ..samplers import task_files
 
 Kind = Literal[
     "certified",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from .. import compose
 from ..errors import ScengenError
-from ..task_files import behaviour_file
+from ..samplers.task_files import behaviour_file
 from ..work.parallel import Limits, Workers, each
 from .behaviour import Behaviour
 from .comparison import Compared, compare

@@ -24,6 +24,7 @@ from ..envs.object_state import bodies_of
 from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception
 from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName
+from ..installation import versions
 from ..orientation import Orientation
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
@@ -31,10 +32,9 @@ from ..pictures.video import check_size
 from ..pool import collection
 from ..pool.demonstrations import demonstration_folders, is_demonstrations
 from ..pool.row import DemonstrationRow
-from ..settings import at_least
 from ..sim.world import World
 from ..validate.playable import stored_world, unplayable
-from ..versions import versions
+from ..work.limits import at_least
 from ..work.parallel import Workers
 from ..work.targets import appearing, check_unfinished, try_file, try_folder
 from .cameras import calibration

@@ -13,9 +13,9 @@ from scipy.spatial import ConvexHull
 from ..assets.mesh_prop import Points
 from ..assets.prop import Prop
 from ..assets.ycb import Ycb, by_name, mesh_of
-from ..cache import cache_folder
 from ..errors import BadConfig
 from ..geometry import UP, Mat3, about_z, shortest
+from ..installation import cache_folder
 from ..samplers.split import Split
 from ..samplers.task import Task, load, things
 from ..work.targets import try_folder, write

@@ -23,8 +23,8 @@ from ..errors import BadConfig, PoolError, ScengenError, UnknownName, cut
 from ..pool.files import read_json_file, sha256, sha256_of_file
 from ..pool.untrusted import HASH, WORD, check_match, check_text, check_versions, check_whole, demand
 from ..sim.embodiment import EMBODIMENTS, action_size
-from ..typed import typed
 from ..work.targets import write
+from ..work.typed import typed
 from .features import Features, number_names
 from .goals import pose_streams
 from .models import KINDS, KNN, MIP

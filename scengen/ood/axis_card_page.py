@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from ..certificate import STAGES
 from ..pictures import film, render
+from ..pictures.page import template
 from ..pictures.plots import svg
-from ..pictures.report import template
 from ..pictures.twins import DIRECTIONS, pair
 from ..pool import Pool, PoolRow
 from ..samplers.axis import spell

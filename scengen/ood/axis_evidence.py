@@ -5,9 +5,6 @@ import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..analysis.distance import Energy
-from ..analysis.distance import energy as energy_distance
-from ..analysis.space import Space, of_features, of_parameters
 from ..errors import Infeasible
 from ..runs import generate
 from ..samplers.split import ID
@@ -16,6 +13,9 @@ from ..scenario import Scenario
 from ..validate.settings import CertifySettings
 from ..work.targets import write
 from . import behaviour, boundary, features
+from .analysis.distance import Energy
+from .analysis.distance import energy as energy_distance
+from .analysis.space import Space, of_features, of_parameters
 from .axis_card import NOT_SEARCHED, AxisCard, AxisSettings
 from .axis_card_page import write_page
 from .baseline import verdict

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from ..errors import BadConfig
-from ..statistics import Difference, Rate, paired, rate
+from ..evaluate.statistics import Difference, Rate, paired, rate
 
 MOTION = ("replay", "any_replay")
 """Baselines of motion memory, from the weaker to the stronger: see `behaviour`."""

@@ -22,13 +22,13 @@ from typing import Any
 from ..attack.solution_memory import SolutionMemory, remember
 from ..episode import Actions
 from ..errors import Infeasible
+from ..evaluate.statistics import Rate, rate
 from ..params import with_values
 from ..samplers.dists import Fixed
 from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..samplers.task import Draw, Task
 from ..scenario import Scenario
-from ..statistics import Rate, rate
 from ..validate.identity import source_sha256
 from ..validate.rebuilt import world_of
 from ..validate.rollout import replay, run

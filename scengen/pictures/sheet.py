@@ -17,7 +17,7 @@ from ..validate.playable import check_row
 from ..validate.rebuilt import rebuild
 from ..work.targets import write
 from . import film, render
-from .report import LARGEST_PAGE, template, thumbnail
+from .page import LARGEST_PAGE, template, thumbnail
 from .twins import DIRECTIONS, pair
 
 STRIP = (8, 240, 180)

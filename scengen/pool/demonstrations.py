@@ -10,7 +10,7 @@ from typing import Any
 
 from ..episode import STRICT, check_rules
 from ..errors import PoolError, ScengenError
-from ..typed import typed
+from ..work.typed import typed
 from . import writing
 from .files import read_json_file, replace_file
 from .manifest import (
@@ -96,7 +96,7 @@ class DemonstrationManifest:
     versions: Mapping[str, str]
     """Versions of the packages that the physics depends on, and the platform."""
     fingerprint: str
-    """Rounding of the machine; see `scengen.fingerprint`."""
+    """Rounding of the machine; see `scengen.work.fingerprint`."""
     task_version: int
     """Version of the task on which the demonstrations were made, see `Scenario.VERSION`."""
     source_sha256: str

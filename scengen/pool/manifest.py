@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import PoolError, ScengenError
-from ..typed import typed
+from ..work.typed import typed
 from .files import FileEntry as FileEntry
 from .files import read_json_file, replace_file
 from .untrusted import (
@@ -84,7 +84,7 @@ class Manifest:
     versions: Mapping[str, str]
     """Versions of the packages that the pool was certified with, and the platform."""
     fingerprint: str
-    """Rounding of the machine that made the pool; see `scengen.fingerprint`."""
+    """Rounding of the machine that made the pool; see `scengen.work.fingerprint`."""
     task_version: int
     """Version of the task on which the pool was made, see `Scenario.VERSION`."""
     source_sha256: str

@@ -11,7 +11,7 @@ import zipfile
 from pathlib import Path
 
 from ..errors import NoRobot, cut
-from ..versions import ROBOSUITE
+from ..installation import ROBOSUITE
 from . import files
 
 

@@ -15,9 +15,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-from ..cache import cache_folder
 from ..errors import NoRobot, cut
-from ..versions import ROBOSUITE
+from ..installation import ROBOSUITE, cache_folder
 
 VARIABLE = "SCENGEN_ROBOSUITE"
 """Environment variable that names a folder with robosuite, or robosuite's folder, or its folder models/assets."""

@@ -16,11 +16,11 @@ from ..pool.files import replace_file, sha256
 from ..pool.manifest import PROCESS, Manifest, RunConfig
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
-from ..settings import at_least
 from ..validate import lock
 from ..validate.certify import Certified, certify
 from ..validate.labels import labels_of_draw, labels_of_task, made_with
 from ..validate.settings import CertifySettings
+from ..work.limits import at_least
 from ..work.parallel import Limits, Workers
 from .attempts import Progress, Wanted, extend, first_of, infeasible, rejection, writing_told
 from .filling import Filling, moved_shards

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from ..errors import BadConfig
-from ..task_files import ID as ID
+from .task_files import ID as ID
 
 
 @dataclass(frozen=True)

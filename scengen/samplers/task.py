@@ -16,12 +16,12 @@ from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Refutation, Scenario
 from ..sim.embodiment import EMBODIMENTS
-from ..task_files import EMBODIMENT, paper_source
 from . import designs
 from .axis import Axis, Proof
 from .designs import Design, Independent
 from .dists import Dist, Fixed, parse
 from .split import ID, Part, Split
+from .task_files import EMBODIMENT, paper_source
 
 REQUIRED_KEYS = ("family", "code", "category", "instruction", "horizon", "id")
 """Keys that every task file has."""

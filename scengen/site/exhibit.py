@@ -25,12 +25,12 @@ from ..samplers.task import Draw, Task
 from ..sim.world import World
 from ..studio.browse import longest_shortcut
 from ..studio.scene import filmed
-from ..typed import typed
 from ..validate.certify import certify
 from ..validate.identity import source_sha256
 from ..validate.playable import check_row, stored_world
 from ..validate.rebuilt import rebuild
 from ..work.targets import write
+from ..work.typed import typed
 from .films import record
 
 DESCRIPTION = "made.json"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..evidence.ledger import Evidence, latest
-from ..task_files import tasks
+from ..samplers.task_files import tasks
 
 PAGES = ("axes", "attacks", "baselines")
 """Pages of docs/ that hold tables whose first column is `task`. They are written from what tools/ measures."""

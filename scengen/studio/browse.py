@@ -10,7 +10,7 @@ import viser
 
 from ..geometry import Vec3
 from ..pictures import film
-from ..pictures.report import template
+from ..pictures.page import template
 from ..pictures.sheet import moved, twin_scene
 from ..pool import Pool, PoolRow
 from ..samplers.task import Task

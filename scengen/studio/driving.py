@@ -11,18 +11,18 @@ import numpy as np
 import viser
 from websockets.asyncio.server import ServerConnection
 
+from ..demos.teleop.collect import Run, Source, TeleopSettings
+from ..demos.teleop.devices import EndedByOperator
+from ..demos.teleop.drive import Timing, drive
+from ..demos.teleop.eye import POLICY_CAMERA, Eye
+from ..demos.teleop.pad import CONNECTED, CONTROLS, PadEvent
+from ..demos.teleop.session import Session, StateLine
 from ..envs.observations import turns_pictures
 from ..errors import ScengenError
+from ..pictures.page import template
 from ..pictures.render import Picture
-from ..pictures.report import template
 from ..pool.untrusted import Malformed, read_json
 from ..sim.world import World
-from ..teleop.collect import Run, Source, TeleopSettings
-from ..teleop.devices import EndedByOperator
-from ..teleop.drive import Timing, drive
-from ..teleop.eye import POLICY_CAMERA, Eye
-from ..teleop.pad import CONNECTED, CONTROLS, PadEvent
-from ..teleop.session import Session, StateLine
 from .scene import Poses, SceneView, poses_of
 
 MAX_MESSAGE = 100

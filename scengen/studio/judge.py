@@ -10,13 +10,13 @@ import viser
 
 from .. import compose
 from ..control.loop import Loop
-from ..curate.curation import FOLDER, Curated, decided_again
-from ..curate.findings import EpisodeReport
-from ..curate.page import plot
-from ..curate.people import Decision, write_decision, write_score
+from ..demos.curate.curation import FOLDER, Curated, decided_again
+from ..demos.curate.findings import EpisodeReport
+from ..demos.curate.page import plot
+from ..demos.curate.people import Decision, write_decision, write_score
 from ..export.dataset import EpisodeData, Recording, rules_of
 from ..export.recording import CONTROL_ACTIONS
-from ..pictures.report import template
+from ..pictures.page import template
 from ..pool.untrusted import read_json
 from ..sim.world import World
 from ..validate.rebuilt import rebuild

@@ -18,8 +18,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TextIO, TypeVar
 
-from ..cache import cache_folder
 from ..errors import BadConfig, cut
+from ..installation import cache_folder
 from .crew import Crew
 from .nodes import ClusterError, code_sha256, one_line
 from .parallel import Limits

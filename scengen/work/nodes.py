@@ -11,9 +11,9 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import ScengenError, cut
-from ..fingerprint import fingerprint
-from ..task_files import conf_dir
-from ..versions import versions
+from ..installation import versions
+from ..samplers.task_files import conf_dir
+from .fingerprint import fingerprint
 from .printed import printable
 
 START_LIMIT = 120.0

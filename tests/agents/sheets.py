@@ -6,7 +6,7 @@ from scengen import load_task
 from scengen.agents import facts
 from scengen.certificate import Check
 from scengen.params import parameters
-from scengen.task_files import facts_file, tasks
+from scengen.samplers.task_files import facts_file, tasks
 
 STATED = [name for name in tasks() if facts_file(name)]
 """Tasks that state facts."""

@@ -11,8 +11,8 @@ from scengen.agents.runner import AgentSettings, run
 from scengen.agents.tables import Agreement, agreement
 from scengen.errors import BadConfig, UnknownName
 from scengen.pool import Pool
+from scengen.samplers.task_files import facts_file, tasks
 from scengen.scenario import Scenario
-from scengen.task_files import facts_file, tasks
 from scengen.validate.rebuilt import world_of
 from scengen.work.log import Log
 

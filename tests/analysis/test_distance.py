@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 
 from scengen import load_task
-from scengen.analysis.coverage import evenness, farthest_points
-from scengen.analysis.distance import energy, near_duplicates, offsets, per_parameter
-from scengen.analysis.space import Batch, of_features, of_parameters
+from scengen.ood.analysis.coverage import evenness, farthest_points
+from scengen.ood.analysis.distance import energy, near_duplicates, offsets, per_parameter
+from scengen.ood.analysis.space import Batch, of_features, of_parameters
 from scengen.params import with_values
 from scengen.samplers.split import ID
 from scengen.symmetry import Symmetry

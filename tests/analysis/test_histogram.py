@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scengen import load_task
-from scengen.analysis.histogram import figure, histogram, label
+from scengen.ood.analysis.histogram import figure, histogram, label
 
 DRAWS = np.random.default_rng(0).uniform(0.0, 1.0, 400)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scengen import cli, load_task
-from scengen.analysis.leaks import MIN_EXPLAINED, explained, leaks
 from scengen.envs import object_state
+from scengen.ood.analysis.leaks import MIN_EXPLAINED, explained, leaks
 
 N = 200
 
@@ -52,7 +52,7 @@ def test_what_very_fine_poses_tell_is_not_in_object_state(monkeypatch, task, par
 @pytest.mark.slow
 def test_the_command_prints_leaks(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(object_state, "RESOLUTION", dict.fromkeys(object_state.RESOLUTION, 1e-12))
-    monkeypatch.setattr("scengen.commands.attack.LEAK_DRAWS", 60)
+    monkeypatch.setattr("scengen.cli.commands.attack.LEAK_DRAWS", 60)
     target = tmp_path / "report.json"
     assert cli.run(["attack", "task=seesaw_balance", "n=1", "tiers=[leaks]", f"json={target}"]) == 0
     assert "target.mass" in [leak["parameter"] for leak in json.loads(target.read_text())["leaks"]["found"]]

@@ -107,8 +107,8 @@ def _apart(work: Callable[[], None]) -> None:
 def warm() -> None:
     """Import and compute once, here, what every child would need anew: the machine's fingerprint, and the tasks."""
     from scengen import cli, compose, list_tasks, load_task  # noqa: F401
-    from scengen.commands import verify  # noqa: F401
-    from scengen.fingerprint import fingerprint
+    from scengen.cli.commands import verify  # noqa: F401
+    from scengen.work.fingerprint import fingerprint
 
     fingerprint()
     for name in list_tasks():

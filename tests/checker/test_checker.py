@@ -15,8 +15,8 @@ from make_corpus import cases, write
 
 from scengen import list_tasks, load_task
 from scengen.pool import Pool
-from scengen.validate.claims import alike
-from scengen.validate.spot import excluded_share
+from scengen.validate.verify.claims import alike
+from scengen.validate.verify.spot import excluded_share
 
 RUN = Path(__file__).parent / "run_corpus.py"
 

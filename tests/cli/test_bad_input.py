@@ -24,7 +24,7 @@ def empty(tmp_path_factory):
         ("crosscheck",),
         ("record", "to=there"),
         ("evaluate", "policy=idle", "to=there"),
-        ("publish", "to=there"),
+        ("export", "hub", "to=there"),
     ],
 )
 def test_a_pool_without_scenarios_is_refused_by_what_needs_some(empty, argv, capsys, tmp_path, monkeypatch):

@@ -16,11 +16,11 @@ import pytest
 from helpers import REFERENCE
 from pools import QUICKLY, make
 
-from scengen import cli, list_tasks, load_task, task_files
+from scengen import cli, list_tasks, load_task
 from scengen.cli import program
+from scengen.cli.commands.settings import read
 from scengen.cli.completion import completions
-from scengen.cli.verbs import RENAMED
-from scengen.commands.settings import read
+from scengen.cli.verbs import RENAMED, file_stem
 from scengen.demos.generate import DemosSettings
 from scengen.errors import BadConfig
 from scengen.evaluate.settings import EvaluateSettings
@@ -31,6 +31,7 @@ from scengen.ood.discovery import search as discovery
 from scengen.pictures import film, render
 from scengen.pool import Pool
 from scengen.runs import generate
+from scengen.samplers import task_files
 from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.validate.settings import QUICK
@@ -98,11 +99,11 @@ def test_bad_input_ends_in_one_clear_line_and_status_2(capsys, argv, says):
 def test_an_old_name_runs_the_new_command_and_says_so(capsys, monkeypatch, old, new):
     run = []
     monkeypatch.setattr(
-        import_module(f"scengen.commands.{new}"), "command", lambda arguments: run.append(arguments) or 0
+        import_module(f"scengen.cli.commands.{file_stem(new)}"), "command", lambda arguments: run.append(arguments) or 0
     )
     status, err = said(capsys, old, "pool=here")
     assert status == 0 and run == [["pool=here"]]
-    assert err == f"scengen: `{old}` is now `{new}`; the old name goes with 0.3\n"
+    assert err == f"scengen: `{old}` is now `{new}`; the old name goes with 0.4\n"
     assert cli.run(("--help",)) == 0 and f"  {old} " not in capsys.readouterr().out
     assert old not in cli.VERBS and old not in completions(f"scengen {old}", cli.VERBS)
 
@@ -162,9 +163,9 @@ def test_an_interrupted_command_says_whether_it_will_continue(capsys, monkeypatc
     def interrupted(arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(import_module(f"scengen.commands.{verb}"), "command", interrupted)
-    status, text = said(capsys, verb)
-    head = (task_files.conf_dir() / "command" / f"{verb}.yaml").read_text().split("# Example")[0]
+    monkeypatch.setattr(import_module(f"scengen.cli.commands.{file_stem(verb)}"), "command", interrupted)
+    status, text = said(capsys, *verb.split())
+    head = task_files.command_file(verb).read_text().split("# Example")[0]
     continues = "to continue" in head
     assert status == 130 and ("is kept" in text) == continues and ("start over" in text) != continues
 
@@ -182,7 +183,7 @@ def test_every_lost_draw_is_counted_with_its_reason(capsys, tmp_path):
 
 @pytest.mark.parametrize("verb", list(cli.VERBS))
 def test_every_command_explains_its_settings(capsys, verb):
-    assert cli.run((verb, "--help")) == 0
+    assert cli.run((*verb.split(), "--help")) == 0
     out = capsys.readouterr().out
     assert out.startswith(f"# scengen {verb}:") and "=" not in out.split("\n")[0]
     assert cli.run(()) == 0 and verb in capsys.readouterr().out
@@ -345,7 +346,7 @@ def test_every_task_file_is_found_without_registration():
 
 
 def test_a_run_that_fails_says_why_while_it_fails_and_when_it_is_interrupted(monkeypatch, capsys, tmp_path):
-    run = importlib.import_module("scengen.commands.generate")
+    run = importlib.import_module("scengen.cli.commands.generate")
     notes = []
 
     def fails(task, certify_settings, settings, progress):
@@ -387,7 +388,7 @@ def test_a_remedy_can_be_followed(tmp_path, capsys):
 
 
 def test_a_shortcut_that_never_rests_gets_a_remedy(monkeypatch, capsys, tmp_path):
-    import scengen.commands.generate as command
+    import scengen.cli.commands.generate as command
 
     def rejected(task, certify_settings, settings, progress):
         pool = Pool.open("generated/reference")

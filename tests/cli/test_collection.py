@@ -7,10 +7,11 @@ import pytest
 from helpers import REFERENCE
 from pools import make
 
-from scengen import cli, compose, list_tasks, load_task, task_files
+from scengen import cli, compose, list_tasks, load_task
 from scengen.envs.pools import rows_of
 from scengen.errors import PoolError
 from scengen.pool import Pool, collection
+from scengen.samplers import task_files
 
 
 @pytest.fixture(scope="module")

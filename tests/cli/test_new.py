@@ -10,7 +10,7 @@ import pytest
 
 import scengen
 from scengen import cli
-from scengen.commands import new
+from scengen.cli.commands import new
 
 
 @pytest.fixture(scope="module")

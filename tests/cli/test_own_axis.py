@@ -2,7 +2,8 @@
 
 import pytest
 
-from scengen import cli, task_files
+from scengen import cli
+from scengen.samplers import task_files
 
 FILE = """
 defaults: [domino_single, _self_]

@@ -8,8 +8,9 @@ import sys
 
 import pytest
 
-from scengen import list_tasks, load_task, task_files
+from scengen import list_tasks, load_task
 from scengen.control.compilation import NOTICE
+from scengen.samplers import task_files
 
 HEAVY = {"mujoco", "numba", "scipy", "numpy", "hydra", "pyarrow", "matplotlib", "robosuite", "gymnasium"}
 MOST = 250
@@ -51,14 +52,14 @@ def test_a_task_and_its_environments_need_neither_ray_nor_the_settings_of_comman
     modules = json.loads(done.stdout.splitlines()[-1])
     assert "scengen.compose" in modules
     assert not {"ray", "scengen.work.cluster"} & set(modules)
-    assert not [name for name in modules if name.startswith("scengen.commands")]
+    assert not [name for name in modules if name.startswith("scengen.cli.commands")]
 
 
 @pytest.mark.slow
 def test_the_first_compilation_is_told_of_once(tmp_path):
     """Twice with a cache of compiled code that is empty at first: what is compiled is told, what is read is not."""
     simulate = "from scengen import cli; cli.run(['--complete', 'x']); cli.run(['--complete', 'x']); "
-    simulate += "from scengen.fingerprint import fingerprint; print(fingerprint())"
+    simulate += "from scengen.work.fingerprint import fingerprint; print(fingerprint())"
     first, second = (
         subprocess.run(
             [sys.executable, "-c", simulate],

@@ -11,7 +11,7 @@ from scengen.validate.rebuilt import world_of
 from scengen.validate.rollout import Jitter, run
 from scengen.validate.settings import Robust
 
-attempt = importlib.import_module("scengen.commands.try")
+attempt = importlib.import_module("scengen.cli.commands.try")
 
 
 def told(capsys, *argv):

@@ -21,8 +21,8 @@ from helpers import needs_robosuite
 from numpy.typing import NDArray
 
 from scengen.control.loop import Loop
+from scengen.installation import ROBOSUITE
 from scengen.robots import files, panda
-from scengen.versions import ROBOSUITE
 
 PERIODS = 200
 WORLDS = {"one arm": ("Lift", "default", ["Panda"]), "two arms": ("TwoArmLift", "parallel", ["Panda", "Panda"])}

@@ -16,12 +16,12 @@ import trainings
 
 from scengen import cli
 from scengen.agents.models import Reply
-from scengen.commands.settings import read_task
-from scengen.curate.curation import CurateSettings, curate
-from scengen.curate.findings import SCHEMA
-from scengen.curate.replays import MAX_REPLAY_ERROR, difference
-from scengen.curate.score import scores_of
-from scengen.curate.videos import PROBES, Prober, check_video, compared, stands_still
+from scengen.cli.commands.settings import read_task
+from scengen.demos.curate.curation import CurateSettings, curate
+from scengen.demos.curate.findings import SCHEMA
+from scengen.demos.curate.replays import MAX_REPLAY_ERROR, difference
+from scengen.demos.curate.score import scores_of
+from scengen.demos.curate.videos import PROBES, Prober, check_video, compared, stands_still
 from scengen.demos.generate import DemosSettings, generate_demonstrations
 from scengen.errors import BadConfig, PoolError
 from scengen.export.dataset import Recording

@@ -11,7 +11,7 @@ import pytest
 from helpers import REFERENCE
 
 from scengen import cli, load_task
-from scengen.commands.settings import read_task
+from scengen.cli.commands.settings import read_task
 from scengen.demos.generate import DemosSettings, Job, generate_demonstrations
 from scengen.demos.styles import NOISE, NOISE_TIME, WEIGHTS, chosen, in_style, style_of
 from scengen.demos.verify import verify_demonstrations

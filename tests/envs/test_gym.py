@@ -11,12 +11,13 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from helpers import REFERENCE, pictures_are_possible
 
-from scengen import list_tasks, load_task, task_files
+from scengen import list_tasks, load_task
 from scengen.control.teleop import LARGEST_CHANGE
 from scengen.envs import observations
 from scengen.envs.gym import PoolEnv, register
 from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.pool import Pool
+from scengen.samplers import task_files
 from scengen.sim.arm import IDLE
 
 EVERYTHING = (*observations.streams_of("panda_jaw"),)

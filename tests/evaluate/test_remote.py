@@ -18,7 +18,7 @@ from scengen.evaluate.remote.wire import BadMessage, msgpack_numpy_array, openpi
 from scengen.evaluate.rollouts import evaluate
 from scengen.evaluate.settings import EvaluateSettings
 from scengen.pool import Pool
-from scengen.task_files import conf_dir
+from scengen.samplers.task_files import conf_dir
 
 REFERENCE = str(helpers.REFERENCE)
 SCHEMES = {"openpi": "ws", "gr00t": "zmq"}

@@ -5,10 +5,10 @@ import time
 import pytest
 from helpers import REFERENCE
 
+from scengen.bench import speed, vector_speed
+from scengen.bench.quiet import disturbance
+from scengen.bench.timing import Measure, alternated
 from scengen.envs.vector import PoolVectorEnv
-from scengen.evaluate import speed, vector_speed
-from scengen.evaluate.quiet import disturbance
-from scengen.evaluate.timing import Measure, alternated
 from scengen.pool import Pool
 
 

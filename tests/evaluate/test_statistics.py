@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from scengen.statistics import (
+from scengen.evaluate.statistics import (
     Rate,
     correlation,
     difference,

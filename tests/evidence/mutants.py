@@ -28,7 +28,7 @@ from scengen import compose, list_tasks, load_task
 from scengen.evidence import comparison
 from scengen.evidence.behaviour import Behaviour
 from scengen.samplers.task import Task
-from scengen.task_files import behaviour_file
+from scengen.samplers.task_files import behaviour_file
 
 ROOT = Path(__file__).parents[2]
 RULES = ("success", "failure", "events", "pending", "build", "constraints")

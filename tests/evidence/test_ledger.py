@@ -14,11 +14,12 @@ import kept_cheats
 import predictors
 import pytest
 
-from scengen import list_tasks, load_task, task_files
+from scengen import list_tasks, load_task
 from scengen.cli import run
 from scengen.errors import BadConfig
 from scengen.evidence import ledger, measuring
 from scengen.evidence.ledger import KINDS, Evidence
+from scengen.samplers import task_files
 
 TASK = load_task("domino_single")
 ROWS = [row for kind in KINDS for task in list_tasks() for row in ledger.read(kind, task)]

@@ -9,7 +9,7 @@ import pytest
 from helpers import REFERENCE, needs_robosuite
 
 from scengen import cli
-from scengen.commands.settings import read_task
+from scengen.cli.commands.settings import read_task
 from scengen.demos.generate import DemosSettings, generate_demonstrations
 from scengen.export.floors import BY_WORD, PAIRS, floor_of, with_floors
 from scengen.export.stats import describe

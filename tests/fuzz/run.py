@@ -22,6 +22,7 @@ sys.path[:0] = [str(ROOT), str(Path(__file__).parents[1])]
 from fuzz.grammar import Grammar  # noqa: E402
 from scengen import cli  # noqa: E402
 from scengen.cli.program import MAX_LINE  # noqa: E402
+from scengen.cli.verbs import file_stem  # noqa: E402
 
 REFERENCE = ROOT / "generated" / "reference"
 LIMIT = 60
@@ -97,7 +98,7 @@ def playground() -> Iterator[Path]:
         os.chdir(Path(made, "cwd"))
         stack.enter_context(mock.patch.object(tempfile, "tempdir", made))
         for verb in cli.VERBS:  # a command that is first imported now would keep what takes the place of its work
-            importlib.import_module(f"scengen.commands.{verb}")
+            importlib.import_module(f"scengen.cli.commands.{file_stem(verb)}")
         for name in WORK if robosuite_runs() else set(WORK) - ROBOSUITE_WORK:
             stack.enter_context(mock.patch(name, side_effect=Work))
         try:
@@ -121,23 +122,23 @@ WORK = (
     "scengen.evaluate.rollouts.each",
     "scengen.evaluate.rollouts.unplayable",
     "scengen.export.recording.unplayable",
-    "scengen.validate.verify.verify",
-    "scengen.commands.verify.verify",
-    "scengen.commands.drift.environment",
-    "scengen.commands.attack.attack",
-    "scengen.commands.bench.bench",
-    "scengen.commands.shrink.certify",
-    "scengen.commands.try._played",
-    "scengen.commands.probe.make_axis_card",
-    "scengen.commands.edition.differences",
-    "scengen.commands.discover.discover",
+    "scengen.validate.verify.pools.verify",
+    "scengen.cli.commands.verify.verify",
+    "scengen.cli.commands.verify_mujoco.environment",
+    "scengen.cli.commands.attack.attack",
+    "scengen.cli.commands.bench.bench",
+    "scengen.cli.commands.axis_shrink.certify",
+    "scengen.cli.commands.try._played",
+    "scengen.cli.commands.axis_card.make_axis_card",
+    "scengen.cli.commands.edition.differences",
+    "scengen.cli.commands.axis_discover.discover",
     "scengen.export.recording._writer",
     "scengen.export.hub.publish",
     "scengen.envs.agreement.compare_all",
     "scengen.pictures.film.Take.moments",
     "scengen.pictures.view.view",
     "scengen.studio.app.Studio",
-    "scengen.commands.asset.encode",
+    "scengen.cli.commands.asset.encode",
     "scengen.intake.asset.make_asset",
 )
 """Where work begins that takes seconds: a command line that gets so far has been accepted."""

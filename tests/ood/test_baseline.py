@@ -3,8 +3,8 @@
 import pytest
 
 from scengen.errors import BadConfig
+from scengen.evaluate.statistics import paired, rate
 from scengen.ood.baseline import INCONCLUSIVE, Baseline, verdict
-from scengen.statistics import paired, rate
 
 
 def baseline(name, training, here, own=1.0):

@@ -8,7 +8,7 @@ import pytest
 from helpers import REFERENCE, pictures_are_possible
 
 from scengen import load_task
-from scengen.analysis.redraw import task_of
+from scengen.ood.analysis.redraw import task_of
 from scengen.pictures import sheet
 from scengen.pictures.render import VIEWS, fitted
 from scengen.pictures.twins import _motion, _projected, telling

@@ -8,10 +8,10 @@ from helpers import REFERENCE
 
 from scengen import cli, load_task
 from scengen.errors import BadConfig, PoolError, UnknownName
+from scengen.evaluate import edition as editions
+from scengen.evaluate.edition import Edition, Frozen, check_pool, chosen_sets, differences, frozen, wanted_sets
 from scengen.pool import Pool
-from scengen.runs import edition as editions
-from scengen.runs.edition import Edition, Frozen, check_pool, chosen_sets, differences, frozen, wanted_sets
-from scengen.task_files import conf_dir
+from scengen.samplers.task_files import conf_dir
 from scengen.tasks.domino_single import DominoSingle
 from scengen.validate.rebuilt import portable_sha256, rebuild
 
@@ -112,7 +112,7 @@ def test_the_command_checks_and_writes_what_is_missing(edition, monkeypatch, cap
     argv = ["edition", f"edition={edition.path}", "tasks=domino_single"]
     assert cli.run(argv) == 0
     assert "1 of 2 sets" in (told := capsys.readouterr().out) and "missing: domino_single/diagonal" in told
-    monkeypatch.setattr("scengen.commands.edition.make_pool", lambda made, key, *_: POOL)
+    monkeypatch.setattr("scengen.cli.commands.edition.make_pool", lambda made, key, *_: POOL)
     assert cli.run([*argv, "write=true"]) == 0
     assert list(Edition.read(str(edition.path)).sets) == [KEY, "domino_single/diagonal"], "in the order of the tasks"
     assert cli.run(argv) == 1, "the scenarios of another split are not those of diagonal"

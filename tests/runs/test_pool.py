@@ -27,7 +27,7 @@ from scengen.pool.row import SCHEMAS
 from scengen.pool.writing import write_pool
 from scengen.tasks.domino_single import DominoSingle
 from scengen.validate.settings import CertifySettings
-from scengen.validate.verify import Options, verify
+from scengen.validate.verify.pools import Options, verify
 
 ROOT = Path(__file__).parents[2]
 

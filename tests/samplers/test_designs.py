@@ -9,8 +9,8 @@ import pytest
 from scipy.stats import qmc
 
 from scengen import cli, load_task
-from scengen.analysis.coverage import evenness
 from scengen.errors import BadConfig, Infeasible
+from scengen.ood.analysis.coverage import evenness
 from scengen.params import values
 from scengen.runs.generate import GenerateSettings
 from scengen.samplers.designs import Grid, Latin, Sobol

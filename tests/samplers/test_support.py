@@ -4,12 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scengen import list_tasks, load_task, task_files
-from scengen.commands.settings import read_task
+from scengen import list_tasks, load_task
+from scengen.cli.commands.settings import read_task
 from scengen.errors import BadConfig, OutOfBounds
 from scengen.ood.features import at_most, departure, sampled, unseen
 from scengen.params import Parameter, parameters, values
 from scengen.runs.generate import GenerateSettings
+from scengen.samplers import task_files
 from scengen.samplers.axis import Axis, spell
 from scengen.samplers.dists import Choice, Fixed, Mixture, Uniform, parse
 from scengen.samplers.split import ID

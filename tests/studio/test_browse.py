@@ -9,7 +9,7 @@ from hostile import PAYLOADS, corpus_texts
 from pools import make, rewritten
 from studios import running
 
-from scengen.analysis.redraw import task_of
+from scengen.ood.analysis.redraw import task_of
 from scengen.pool import Pool
 
 pytestmark = pytest.mark.slow  # a browser that draws in software takes minutes on two cores

@@ -22,7 +22,11 @@ from pads import Domino
 from studios import running
 
 from scengen import cli, compose, load_task
-from scengen.commands.teleop import source_of_pool
+from scengen.cli.commands.demos_pad import source_of_pool
+from scengen.demos.teleop.collect import Source, TeleopSettings
+from scengen.demos.teleop.eye import POLICY_CAMERA
+from scengen.demos.teleop.pad import PadEvent
+from scengen.demos.teleop.session import ENDED, PAUSED, READY
 from scengen.envs.observations import cameras_of
 from scengen.pictures.render import Camera
 from scengen.pool import Pool
@@ -30,10 +34,6 @@ from scengen.pool.demonstrations import Demonstrations
 from scengen.pool.untrusted import Malformed
 from scengen.studio.app import Content
 from scengen.studio.driving import PICTURE, BrowserPad, Driver, _event
-from scengen.teleop.collect import Source, TeleopSettings
-from scengen.teleop.eye import POLICY_CAMERA
-from scengen.teleop.pad import PadEvent
-from scengen.teleop.session import ENDED, PAUSED, READY
 
 BUTTONS = ["a", "b", "x", "y", "leftshoulder", "rightshoulder", "lefttrigger", "righttrigger", "back", "start"]
 AXES = ["leftx", "lefty", "rightx", "righty"]

@@ -10,9 +10,9 @@ import pytest
 from studios import running
 
 from scengen import cli
-from scengen.commands.settings import read_task
-from scengen.curate.curation import decided_again
-from scengen.curate.people import Decision, decisions_of_people, scores_by_people, write_decision, write_score
+from scengen.cli.commands.settings import read_task
+from scengen.demos.curate.curation import decided_again
+from scengen.demos.curate.people import Decision, decisions_of_people, scores_by_people, write_decision, write_score
 from scengen.demos.generate import DemosSettings, generate_demonstrations
 from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.export.dataset import Recording

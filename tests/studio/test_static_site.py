@@ -12,7 +12,7 @@ from helpers import REFERENCE
 from hostile import PAYLOADS, corpus_texts
 
 from scengen import load_task
-from scengen.analysis.redraw import task_of
+from scengen.ood.analysis.redraw import task_of
 from scengen.pool import Pool
 
 pytestmark = pytest.mark.slow  # a browser that draws in software takes minutes on two cores

@@ -6,11 +6,12 @@ from pathlib import Path
 import pytest
 from foreign.push_block import PushBlock
 
-from scengen import cli, conformance, list_tasks, load_task, task_files
+from scengen import cli, conformance, list_tasks, load_task
 from scengen.conformance import rules
 from scengen.conformance.rules import Nonconformity
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig, UnknownName
+from scengen.samplers import task_files
 from scengen.samplers.dists import Fixed
 from scengen.scenario import Shortcut
 

@@ -4,7 +4,8 @@ import re
 
 import pytest
 
-from scengen import list_tasks, task_files
+from scengen import list_tasks
+from scengen.samplers import task_files
 
 MEAN = re.compile(r"^horizon: *([0-9.]+) *#.*takes ([0-9.]+) s [(]paper", re.M)
 """A time limit, and the mean demonstration of the paper beside it [s]."""

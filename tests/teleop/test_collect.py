@@ -10,18 +10,18 @@ import pytest
 from helpers import REFERENCE
 
 from scengen import cli
-from scengen.commands import BAD_INPUT, FAILED, OK
+from scengen.cli.commands import BAD_INPUT, FAILED, OK
+from scengen.demos.teleop.pad import read_events
 from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations, write_demonstrations
 from scengen.pool.files import sha256
 from scengen.scenario import Strict
 from scengen.tasks.domino_single import DominoSingle
-from scengen.teleop.pad import read_events
 
 
 def teleop(folder, *given, **changed):
     """Drive `domino_single` with a program; return the exit status."""
     asked = {"task": "domino_single", "device": "pads:Domino", "n": 3, "operator": "op7", **changed, "to": folder}
-    return cli.run(["teleop", *(f"{name}={value}" for name, value in asked.items() if value is not None), *given])
+    return cli.run(["demos", "pad", *(f"{name}={value}" for name, value in asked.items() if value is not None), *given])
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_driven_verified_recorded_curated(made, tmp_path, capsys):
     assert table["scengen/operator"].to_pylist() == ["op7"] * 3
     assert cli.run(["curate", f"data={data}"]) == OK
     assert json.loads((data / "curation" / "kept.json").read_text()) == [0, 1, 2]
-    assert cli.run(["stats", f"data={data}"]) == OK
+    assert cli.run(["curate", "stats", f"data={data}"]) == OK
 
 
 @pytest.mark.slow

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from scengen.demos.teleop.mapping import Grips, action_of, advanced, motion
+from scengen.demos.teleop.pad import CONTROLS, Pad, PadEvent, line_of, read_events
 from scengen.errors import ScengenError
-from scengen.teleop.mapping import Grips, action_of, advanced, motion
-from scengen.teleop.pad import CONTROLS, Pad, PadEvent, line_of, read_events
 
 
 def pad_with(**values):

@@ -9,9 +9,9 @@ from helpers import pictures_are_possible
 from pads import Domino
 from test_session import stage_of
 
-from scengen.teleop.drive import Timing, drive
-from scengen.teleop.pad import BUTTONS, STICKS, TRIGGERS, PadEvent
-from scengen.teleop.session import PAUSED, Session
+from scengen.demos.teleop.drive import Timing, drive
+from scengen.demos.teleop.pad import BUTTONS, STICKS, TRIGGERS, PadEvent
+from scengen.demos.teleop.session import PAUSED, Session
 
 if importlib.util.find_spec("pygame") is None:
     pytest.skip("no pygame; it is in the extra teleop", allow_module_level=True)
@@ -19,7 +19,7 @@ else:
     import pygame
     from virtual_pad import VirtualPad, measure
 
-    from scengen.teleop.sdl import KEYS, Gamepad, Keyboard, Window
+    from scengen.demos.teleop.sdl import KEYS, Gamepad, Keyboard, Window
 
 LINE = None
 """State line of a device that does not read it."""

@@ -5,12 +5,12 @@ from pads import Domino
 
 from scengen import load_task
 from scengen.control.teleop import Filter
+from scengen.demos.teleop.mapping import action_of, advanced
+from scengen.demos.teleop.pad import Pad, PadEvent
+from scengen.demos.teleop.session import ENDED, PAUSED, READY, RUNNING, SETTLING, Session, Stage
 from scengen.errors import ScengenError
-from scengen.teleop.mapping import action_of, advanced
-from scengen.teleop.pad import Pad, PadEvent
-from scengen.teleop.session import ENDED, PAUSED, READY, RUNNING, SETTLING, Session, Stage
-from scengen.validate.claims import passed_filter
 from scengen.validate.rebuilt import rebuild
+from scengen.validate.verify.claims import passed_filter
 
 
 def stage_of(name="domino_single", horizon=None):

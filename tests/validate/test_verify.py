@@ -24,11 +24,11 @@ from scengen.errors import PoolError
 from scengen.pool import Pool
 from scengen.pool.files import sha256
 from scengen.pool.writing import write_pool
-from scengen.validate.claims import Claims
-from scengen.validate.junit import junit
-from scengen.validate.spot import excluded_share
-from scengen.validate.stored import settings_of_manifest, task_of_manifest
-from scengen.validate.verify import Examiner, Options, _Run, verify
+from scengen.validate.verify.claims import Claims
+from scengen.validate.verify.junit import junit
+from scengen.validate.verify.pools import Examiner, Options, _Run, verify
+from scengen.validate.verify.spot import excluded_share
+from scengen.validate.verify.stored import settings_of_manifest, task_of_manifest
 from scengen.work.parallel import Limits
 
 pytestmark = of_stored_pools
@@ -399,7 +399,7 @@ def test_a_family_of_a_manifest_is_never_imported(mine, tmp_path, monkeypatch):
     (tmp_path / "evilmod.py").write_text(f"open({str(tmp_path / 'HACKED')!r}, 'w')\nclass Evil: pass\n")
     monkeypatch.syspath_prepend(tmp_path)
     changed(mine, lambda m: m["config"]["task"].update(family="evilmod.Evil"))
-    from scengen.analysis.redraw import task_of
+    from scengen.ood.analysis.redraw import task_of
 
     assert not report(mine).holds
     with pytest.raises(PoolError, match=r"names the family 'evilmod.Evil'"):

@@ -13,9 +13,10 @@ from scengen.errors import ScengenError
 from scengen.pool import Pool
 from scengen.pool.files import sha256
 from scengen.pool.writing import write_pool
-from scengen.validate import survey, verify
 from scengen.validate.playable import check_row, check_scene
-from scengen.validate.survey import Reject
+from scengen.validate.verify import pools as verify
+from scengen.validate.verify import survey
+from scengen.validate.verify.survey import Reject
 from scengen.work.parallel import Limits, WorkerDied
 
 
@@ -135,8 +136,8 @@ def test_a_scene_that_does_not_end_is_named_before_anybody_looks_at_it(monkeypat
 
 
 def test_a_reject_needs_the_scene_that_belongs_to_it():
-    from scengen.validate.examine import Examiner
-    from scengen.validate.stored import settings_of_manifest, task_of_manifest
+    from scengen.validate.verify.examine import Examiner
+    from scengen.validate.verify.stored import settings_of_manifest, task_of_manifest
 
     of = Pool.open(REFERENCE)
     made = verify.Claims.of(of, task_of_manifest(of, load_task(of.task)), settings_of_manifest(of.manifest))

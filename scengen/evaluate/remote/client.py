@@ -11,8 +11,8 @@ import yaml
 from ...envs.gym import action_repeat_at
 from ...envs.observations import proprioception
 from ...errors import BadConfig, UnknownName, cut
-from ...task_files import conf_dir
-from ...typed import typed
+from ...samplers.task_files import conf_dir
+from ...work.typed import typed
 
 PROTOCOLS = {"ws": "openpi", "zmq": "gr00t"}
 """Names of the protocols, and of their files in conf/clients, by the scheme of an address."""

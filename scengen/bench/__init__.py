@@ -1,0 +1,1 @@
+"""Measurements of the costs that scengen documents, as ratios within one run."""

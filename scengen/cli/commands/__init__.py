@@ -1,0 +1,120 @@
+"""One module per command: its docstring is the help line, `command(arguments)` runs it and returns the exit status."""
+
+import json
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ...errors import BadConfig, cut
+from ...pool import Pool, PoolRow, collection
+from ...pool.library import Library
+from ...pool.library import names as names  # for the commands
+from ...pool.names import Misnamed
+from ...work.printed import PlainConsole, printable
+from ...work.targets import write as write  # for the commands
+
+OK = 0
+"""Exit status: success."""
+FAILED = 1
+"""Exit status: a check failed, or not all work succeeded."""
+BAD_INPUT = 2
+"""Exit status: bad input, a fault of the machine, or no verdict."""
+INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
+
+out = PlainConsole(width=None if sys.stdout.isatty() else 160)
+err = PlainConsole(stderr=True, soft_wrap=True)
+
+Arguments = Sequence[str]
+
+
+def say(text: str) -> None:
+    """Print a line literally: no markup, colours or control characters."""
+    out.print(printable(text), soft_wrap=True)
+
+
+def warn(text: str, style: str = "red") -> None:
+    """Print a line on standard error literally."""
+    err.print(printable(text), style=style, soft_wrap=True)
+
+
+def remark(text: str) -> None:
+    """Print a remark on standard error about a success with restrictions."""
+    warn(f"scengen: {text}", "yellow")
+
+
+def intake(module: str) -> ModuleType:
+    """A module of `scengen.intake`, which needs packages of an extra.
+
+    Raises:
+        BadConfig: one of them is not installed.
+    """
+    try:
+        return import_module(f"scengen.intake.{module}")
+    except ImportError as error:
+        raise BadConfig(f"importing meshes needs {error.name}; pip install 'scengen[mesh]'") from None
+
+
+def one(pool: str | list[str] | None) -> str:
+    """The folder of the pool, for a command that accepts one."""
+    if pool is None:
+        raise BadConfig("no pool was given; give pool=FOLDER")
+    found = several(pool)
+    if len(found) > 1:
+        raise BadConfig(f"pool = {cut(','.join(found), 400)}; this command accepts one pool")
+    return found[0]
+
+
+def several(pool: str | list[str]) -> list[str]:
+    """Folders of the pools, one or more. A folder of pools stands for its pools."""
+    if not pool:
+        raise BadConfig("pool = ''; give the folder of a pool")
+    return collection.folders(pool)
+
+
+def filled(folder: str) -> Pool:
+    """The checked pool in a folder, for a command that computes something from its scenarios.
+
+    Raises:
+        BadConfig: it holds no scenario.
+    """
+    pool = Pool.open(folder).check()
+    if not len(pool):
+        why = f"none of its {pool.manifest.indices} indices was certified"
+        raise BadConfig(f"{pool.folder} holds no scenario: {why}; see scengen show pool={pool.folder} for the reasons")
+    return pool
+
+
+def holder(pool: str | list[str] | None, name: str) -> Pool:
+    """The pool with the scenario `name`: the only pool given, or the one of several that holds it."""
+    found = [Pool.open(folder) for folder in several(pool or "")]
+    if len(found) == 1:
+        return found[0].check()
+    library = Library(found)
+    return found[library.source(library.find(name))].check()
+
+
+def chosen(pool: Pool, name: str) -> PoolRow:
+    """The scenario `name` of a pool. A remark is printed if the name contradicts the id in it."""
+    with misnaming_remarked():
+        return pool.row(name)
+
+
+@contextmanager
+def misnaming_remarked() -> Iterator[None]:
+    """Print a remark if a name that is looked up contradicts the id in it."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", Misnamed)
+        yield
+    for one in told:
+        remark(str(one.message))
+
+
+def write_json(path: str, result: Any) -> None:
+    """Write the result of a command to the file that json= names."""
+    write(Path(path), json.dumps(result, indent=1) + "\n")

@@ -1,0 +1,159 @@
+"""list assets, write one as a mesh, or import a mesh as a new asset"""
+
+import json
+import math
+from dataclasses import Field, dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+
+from ...assets.kits import kit, kits
+from ...compose import composed
+from ...errors import BadConfig, cut
+from ...export.mesh import FORMATS, encode
+from ...params import parameters
+from ...pictures import render
+from ...work.targets import try_file, try_folder
+from . import FAILED, OK, Arguments, intake, out, remark, say, write
+from .settings import read
+
+if TYPE_CHECKING:
+    from ...intake.asset import MeshAsset
+
+
+_NAMES = ("name", "to", "mesh")
+"""Settings that say what to do. All others are about an imported mesh."""
+
+
+@dataclass(frozen=True)
+class AssetSettings:
+    """Settings of `scengen asset`; conf/command/asset.yaml explains them."""
+
+    name: str | None
+    to: str | None
+    mesh: str | None
+    units: str | None
+    up: str | None
+    mass: float | None
+    density: float | None
+    friction: float
+    error: float
+    pieces: int
+    seed: int
+
+    def check(self) -> None:
+        """Raise `BadConfig` for settings that do not go together."""
+        if self.name is not None and self.mesh is not None:
+            raise BadConfig("name= writes an asset as a mesh, mesh= imports a mesh as an asset; give one of them")
+        if self.to is None and (self.name is not None or self.mesh is not None):
+            where = "to=FILE.stl" if self.mesh is None else "to=FOLDER"
+            raise BadConfig(f"asset needs {where}; see scengen asset --help")
+        if self.to is not None and self.name is None and self.mesh is None:
+            raise BadConfig(f"to = {cut(self.to)}, without an asset; give name=ASSET or mesh=FILE")
+        if self.mesh is None and (
+            unused := [f.name for f in fields(self) if f.name not in _NAMES and self._is_given(f)]
+        ):
+            raise BadConfig(f"{', '.join(unused)}: settings of an imported mesh; give mesh=FILE, or leave them out")
+
+    def _is_given(self, setting: "Field[Any]") -> bool:
+        """Whether a setting differs from its default."""
+        return getattr(self, setting.name) != composed("asset", [])[0][setting.name]
+
+
+def command(arguments: Arguments) -> int:
+    settings = read("asset", arguments, AssetSettings)
+    settings.check()
+    if settings.mesh is not None:
+        return _import_mesh(settings, Path(str(settings.to)))
+    if settings.name is not None:
+        return _write_mesh(settings.name, Path(str(settings.to)))
+    out.print(_table())
+    return OK
+
+
+def _table() -> Table:
+    table = Table("asset", "parameter", "nominal", "range", "unit")
+    for name, kind in kits().items():
+        for i, p in enumerate(parameters(kind())):
+            table.add_row("" if i else name, p.name, f"{p.nominal:g}", f"{p.low:g} to {p.high:g}", p.unit)
+    return table
+
+
+def _write_mesh(name: str, target: Path) -> int:
+    prop = kit(name)
+    if target.suffix not in FORMATS:
+        raise BadConfig(f"to = {cut(str(target))}; name a file that ends in {', '.join(FORMATS)}")
+    try_file(target)
+    write(target, encode(prop, target.suffix))
+    say(f"wrote {target}")
+    return OK
+
+
+def _import_mesh(settings: AssetSettings, folder: Path) -> int:
+    asset = intake("asset")
+    names = [field.name for field in fields(asset.IntakeRequest)]
+    request = asset.IntakeRequest(**{name: getattr(settings, name) for name in names})
+    request.check()
+    try_folder(folder)
+    if known := asset.stored_figures(request, folder):
+        say(f"{folder} already holds this mesh with these settings; nothing was computed")
+        return _report(known)
+    taken = asset.make_asset(request)
+    figures = taken.figures()
+    _write(taken, figures, folder)
+    return _report(figures)
+
+
+def _write(taken: "MeshAsset", figures: dict[str, Any], folder: Path) -> None:
+    """Write the files of an asset. The figures come last: they vouch for the others."""
+    from ...intake.preview import preview
+
+    write(folder / "asset.xml", taken.xml)
+    try:
+        write(folder / "preview.png", render.encode(preview(taken.prop), "png"))
+        names = "asset.xml, asset.json and preview.png"
+    except render.NoPictures as error:
+        remark(f"{folder} has no preview.png: {error}")
+        names = "asset.xml and asset.json"
+    write(folder / "asset.json", json.dumps(figures, indent=1) + "\n")
+    say(f"wrote {names} in {folder}")
+
+
+def _report(figures: dict[str, Any]) -> int:
+    """Print the figures.
+
+    Returns:
+        Exit status: whether the asset is as accurate as asked for, and comes to rest.
+    """
+    error, hull, rest = figures["error"], figures["error_of_one_hull"], figures["rest"]
+    asked = figures["settings"]["error"]
+    is_accurate, count = max(error["outward"], error["inward"]) <= asked, figures["pieces"]
+    say(
+        f"{count} convex piece{'s' * (count > 1)}: {1000 * error['outward']:.2f} mm too far out and "
+        f"{1000 * error['inward']:.2f} mm too far in at most, {error['volume']:.3f} times the volume; "
+        f"one convex hull: {1000 * hull['outward']:.2f} mm, {hull['volume']:.3f} times"
+    )
+    say(
+        f"{figures['mass']:.3g} kg; released on the table it moves by {1000 * rest['creep']:.3f} mm in 2 s, "
+        f"at {1000 * rest['speed']:.2f} mm/s at most"
+    )
+    say(_about_sides(figures))
+    if not is_accurate:
+        say(f"MISSED: the error of {1000 * asked:g} mm; allow more pieces or a larger error")
+    if not rest["rests"]:
+        say("MISSED: it does not come to rest; give it a flat foot, or set a smaller error")
+    return OK if is_accurate and rest["rests"] else FAILED
+
+
+def _about_sides(figures: dict[str, Any]) -> str:
+    """Which axis of the file points up and why, and the side on which the asset stands after the drop."""
+    given, rest = figures["settings"]["up"], figures["rest"]
+    is_gltf = figures["input"]["file"].lower().endswith(".glb")
+    why = "as given" if given else "as glTF defines" if is_gltf else "the default; give up=AXIS if it is another one"
+    lean = math.degrees(rest["lean"])
+    oblique = f", tilted by {lean:.0f} deg" if lean > 1.0 else ""
+    return (
+        f"its {figures['up']} axis points up ({why}); on the table it "
+        f"{'fell over and lies' if rest['fell'] else 'stands'} on its {rest['side_below']} side{oblique}"
+    )

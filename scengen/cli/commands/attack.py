@@ -1,0 +1,119 @@
+"""search with the built-in adversary for unintended ways to reach a goal"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from itertools import islice
+from pathlib import Path
+
+from ... import compose
+from ...attack.adversary import LEAKS, TIERS
+from ...attack.campaign import AttackReport, AttackSettings, Subject, attack, certified, drawn
+from ...attack.evidence import spelled
+from ...attack.priors import Prior
+from ...errors import BadConfig
+from ...ood.analysis.leaks import Leaks, leaks
+from ...ood.analysis.redraw import task_of
+from ...pool import Pool
+from ...runs.progress import ProgressBar
+from ...samplers.task import Task
+from ...samplers.task_files import search_path
+from ...work.targets import try_file, try_folder
+from ..tables import attack_table
+from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, warn, write_json
+from .settings import read
+
+LEAK_DRAWS = 200
+"""Number of draws whose observations are searched for hidden parameters."""
+
+
+def command(arguments: Arguments) -> int:
+    settings = read("attack", arguments, AttackSettings)
+    settings.check()
+    if settings.tiers is not None and not settings.tiers:
+        raise BadConfig(f"tiers = []; an attack without tiers finds nothing; give some of {', '.join((*TIERS, LEAKS))}")
+    try_file(settings.json)
+    try_folder(settings.to)
+    task, pool = _task(arguments, settings)
+    folder = Path(settings.to or f"generated/attack/{task.name}")
+    try_folder(folder)
+    plain = asdict(_leaks(task, settings)) if settings.observed else None
+    if not settings.chosen:
+        if settings.json:
+            write_json(settings.json, {"task": task.name, "leaks": plain})
+        return OK
+    subjects = _subjects(task, pool, settings)
+    with ProgressBar(err, f"attack {task.name}", len(subjects), settings.workers) as progress_bar:
+
+        def progress(done: int, hits: int) -> None:
+            progress_bar.show(done, f"{hits} hits")
+
+        report = attack(task, subjects, settings, folder, progress)
+    out.print(attack_table(report))
+    names = {one.scenario.id: str(one.name) for one in subjects}
+    for line in _remarks(report, names):
+        say(line)
+    for hit in report.refuting:
+        warn(f"REFUTED {names[hit.scenario]} {hit}; {hit.name}.npz")
+    cost = f"{report.cpu / max(report.rollouts, 1):.2f} CPU s per rollout"
+    say(f"{report.rollouts} rollouts on {len(report.scenarios)} scenarios, {cost}; hits are in {folder}")
+    if settings.json:
+        write_json(settings.json, {**report.plain(), "leaks": plain})
+    return FAILED if report.refuting else BAD_INPUT if report.lost else OK
+
+
+def _leaks(task: Task, settings: AttackSettings) -> Leaks:
+    """Search observations for hidden parameters, and print what they tell."""
+    with ProgressBar(err, f"observe {task.name}", LEAK_DRAWS, settings.workers) as progress_bar:
+        found = leaks(task, settings.split, LEAK_DRAWS, settings.seed, settings.workers, progress_bar.show)
+    what = f"{len(found.hidden)} hidden parameters in {found.draws} draws of {found.split}"
+    say(f"{what}: observations tell {len(found.found)}")
+    for leak in found.found:
+        warn(f"LEAK {leak.stream} tells {leak.parameter}: explained variance {leak.explained:.2f} on held-out draws")
+    return found
+
+
+def _task(arguments: Arguments, settings: AttackSettings) -> tuple[Task, Pool | None]:
+    """The task to attack, and the pool that it was given by, if any.
+
+    Raises:
+        ScengenError: neither a task nor a pool was given, or both.
+    """
+    name, others = compose.chosen_task("attack", arguments), [a for a in arguments if a.startswith("task.")]
+    if (name is None) == (settings.pool is None):
+        raise BadConfig("attack needs either task=NAME or pool=FOLDER; see scengen attack --help")
+    if name is not None:
+        return compose.load_task(name, [*search_path(arguments), *others]), None
+    pool = Pool.open(str(settings.pool)).check()
+    return task_of(pool, search_path(arguments)), pool
+
+
+def _subjects(task: Task, pool: Pool | None, settings: AttackSettings) -> Sequence[Subject]:
+    """The scenarios to attack: draws of the task, or the first ones of the pool.
+
+    Raises:
+        ScengenError: there is no scenario to attack.
+    """
+    if pool is None:
+        return drawn(task, settings.split, settings.n, settings.seed)
+    if not (subjects := certified(task, islice(pool.rows(), settings.n))):
+        raise BadConfig(f"{pool.folder} holds no scenario to attack; choose another pool")
+    return subjects
+
+
+def _remarks(report: AttackReport, names: Mapping[str, str]) -> list[str]:
+    """Lines about fixed answers, shortcuts that were not tried, and attacks that did not finish."""
+    counts = Counter((one.name, one.raw, one.reason) for one in report.untried)
+    untried = [
+        f"not tried {times} times: {name} ({spelled(raw)}): {reason}" for (name, raw, reason), times in counts.items()
+    ]
+    lost = [f"unknown: the attack on {names[id_]} {why}" for id_, _, why in (one.partition(" ") for one in report.lost)]
+    return [*map(_fixed_answers, report.priors), *untried, *lost]
+
+
+def _fixed_answers(prior: Prior) -> str:
+    values = ", ".join(f"{value:.3g}" for value in prior.values)
+    told = f"fixed answers {values}: right in {prior.fitted:.1%} of the draws where they were fitted"
+    if prior.fresh is None or prior.bound is None:
+        return told
+    return f"{told}, in {prior.fresh:.1%} (< {prior.bound:.1%}) of {prior.draws} others"

@@ -1,0 +1,96 @@
+"""make demonstrations of new scenarios in several styles, and keep those that succeed"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rich.table import Table
+
+from ...compose import Combination, combinations
+from ...demos.generate import STEPS, DemosSettings, DemosSummary, generate_demonstrations
+from ...errors import BadConfig, ScengenError
+from ...runs.progress import ProgressBar
+from ...samplers.task import Task
+from ...validate.settings import CertifySettings
+from . import FAILED, OK, Arguments, err, out, say, warn
+from .settings import read_task
+
+GENERATED = "generated"
+"""Default folder of the demonstrations of a sweep."""
+MAX_REASONS = 8
+"""Largest number of reasons in the table of attempts."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One folder of demonstrations to make."""
+
+    task: Task
+    certify_settings: CertifySettings
+    settings: DemosSettings
+
+    def __call__(self) -> DemosSummary:
+        """Make the demonstrations, and print a summary."""
+        task, settings = self.task, self.settings
+        with ProgressBar(err, f"{task.name}/{settings.split} demos", settings.n, settings.workers) as progress_bar:
+
+            def progress(kept: int, tried: int, verdicts: Mapping[str, int], reasons: Mapping[str, int]) -> None:
+                failed = verdicts.get("failed", 0)
+                progress_bar.show(min(kept, settings.n), f"{tried} tried, {failed} failed")
+
+            summary = generate_demonstrations(task, self.certify_settings, settings, progress)
+        out.print(_table(summary))
+        made, manifest, where = summary.made, summary.manifest, summary.demonstrations.folder
+        styles = ", ".join(f"{n} {style}" for style, n in sorted(manifest.styles.items()))
+        say(f"{where}: {made} demonstrations ({styles}) of {manifest.indices} attempts")
+        if made:
+            say(f"processor time per demonstration: {summary.cpu / made:.2f} s")
+        say(f"sha256: {summary.demonstrations.sha256}")
+        if made < settings.n:
+            warn(f"scengen: only {made} of {settings.n} demonstrations; see the reasons above, or raise limit=")
+        return summary
+
+
+def command(arguments: Arguments) -> int:
+    asked = combinations("demos", arguments)
+    runs = [_checked(one, len(asked) > 1) for one in asked]
+    folders = [run.settings.to for run in runs]
+    if len(set(folders)) < len(folders):
+        raise BadConfig("two of the combinations would be written to the same folder; sweep task and split alone")
+    statuses = [OK if run().made == run.settings.n else FAILED for run in runs]
+    return max(statuses)
+
+
+def _checked(asked: Combination, several: bool) -> Run:
+    """The run of a combination, checked before any run starts, with a folder below to= if there are several.
+
+    Raises:
+        BadConfig: the combination is not valid; the message names it.
+    """
+    try:
+        settings, task, certify_settings = read_task("demos", asked.overrides, DemosSettings)
+        settings.check(task)
+    except ScengenError as error:
+        if not several:
+            raise
+        raise BadConfig(f"{asked}: {error}; nothing was made; leave this combination out") from None
+    if several:
+        name = f"{task.name}-{settings.split}" + ("" if settings.to else "-demos")
+        settings = replace(settings, to=str(Path(settings.to or GENERATED, name)))
+    return Run(task, certify_settings, settings)
+
+
+def _table(summary: DemosSummary) -> Table:
+    """Number of attempts after each step, and the reasons of those that failed."""
+    table = Table("step", "left", "lost", "share", title="attempts", title_justify="left")
+    funnel, before = summary.manifest.funnel, None
+    for step in ("attempted", *STEPS):
+        count = funnel[step]
+        lost = "" if before in (None, count) else str(before - count)
+        table.add_row(step, str(count), lost, f"{count / max(1, funnel['attempted']):.0%}")
+        before = count
+    if summary.manifest.reasons:
+        table.add_section()
+        for reason, count in sorted(summary.manifest.reasons.items(), key=lambda item: -item[1])[:MAX_REASONS]:
+            table.add_row(reason[:90], "", str(count), "", style="dim")
+    return table

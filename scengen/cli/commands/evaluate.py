@@ -1,0 +1,111 @@
+"""measure the success rate of policies, in and out of distribution, with intervals"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from rich.table import Table
+
+from ...compose import load_task
+from ...demos.rollouts import Keeper
+from ...evaluate.comparison import MAX_SHOWN, Comparison, PolicyResult
+from ...evaluate.edition import Edition, check_pool, chosen_sets, evaluation_pools
+from ...evaluate.policies import find_policy
+from ...evaluate.rollouts import Evaluation, evaluate
+from ...evaluate.settings import EvaluateSettings, other_version
+from ...pool import Pool
+from ...runs.progress import ProgressBar
+from ...samplers.task_files import search_path
+from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write, write_json
+from .settings import read
+
+
+def command(arguments: Arguments) -> int:
+    settings = read("evaluate", arguments, EvaluateSettings)
+    settings.check_pools()
+    every = settings.several()
+    for one in every:  # before any of them plays for hours
+        one.check()
+        find_policy(one.name, client=one.remote)
+    if settings.edition:
+        folders = _edition_pools(settings, settings.edition)
+        settings = replace(settings, pool=folders)
+        every = settings.several()
+    results, search = [], search_path(arguments)
+    for one in every:
+        if told := other_version(one, search):
+            remark(told)
+        with ProgressBar(err, f"evaluate {one.name}", 1, one.workers) as progress_bar:
+            results.append(PolicyResult(one, _evaluated(one, progress_bar.of, search)))
+    compared = Comparison(results)
+    _show(compared, settings)
+    write(settings.folder / "table.md", compared.markdown)
+    write_json(str(settings.folder / "table.json"), compared.plain)
+    incomplete = [_report(result) for result in results]
+    if len(results) > 1:
+        for result in results:
+            say(f"wrote {result.settings.folder}: episodes.jsonl")
+    say(f"wrote {settings.folder}: table.md, table.json{'' if len(results) > 1 else ', episodes.jsonl'}")
+    return FAILED if any(incomplete) else OK
+
+
+def _edition_pools(settings: EvaluateSettings, edition: str) -> list[str]:
+    """The pools of an edition: the given ones, which must be its sets, or those of the chosen tasks."""
+    found = Edition.read(edition)
+    if settings.pool is not None:
+        keys = [check_pool(found, Pool.open(folder).check()) for folder in settings.folders]
+    else:
+        keys = chosen_sets(settings.tasks) if settings.tasks else list(found.sets)
+    for line in found.other_versions(keys):
+        remark(line)
+    if settings.pool is not None:
+        return settings.folders
+    with ProgressBar(err, f"edition {found.name}", found.n, settings.workers) as progress_bar:
+        return evaluation_pools(
+            found, keys, settings.workers, lambda key, done, total: progress_bar.of(done, total, f"certify {key}")
+        )
+
+
+def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None], search: Sequence[str]) -> Evaluation:
+    """Evaluate one policy, and keep its rollouts if that is asked for."""
+    if not settings.keep:
+        return evaluate(settings, progress, search)
+    tasks = {pool.task: load_task(pool.task, search) for pool in map(Pool.open, settings.folders)}
+    with Keeper(settings, tasks) as keeper:
+        found = evaluate(settings, progress, search, keeper)
+        for one in keeper.finish():
+            many = sum(one.manifest.outcomes.values())
+            say(f"kept {many} rollouts, {one.made} of them successes: {one.demonstrations.folder}")
+    return found
+
+
+def _show(compared: Comparison, settings: EvaluateSettings) -> None:
+    """Print the tables and the headlines."""
+    title = f"{', '.join(one.name for one in settings.several())}: success [%], {settings.rules} rules"
+    shown = Table(*compared.head, title=title, title_justify="left")
+    for row in compared.rows():
+        shown.add_row(*row)
+    out.print(shown)
+    if every := list(compared.failure_rows()):
+        why = Table(*compared.failure_head, title="failures", title_justify="left")
+        for row in every[:MAX_SHOWN]:
+            why.add_row(*row)
+        out.print(why)
+        if (more := len(every) - MAX_SHOWN) > 0:
+            say(f"{more} more reasons are in table.md")
+    for line in compared.headlines:
+        say(line)
+
+
+def _report(result: PolicyResult) -> bool:
+    """Print what is to be known about the run of one policy. Returns whether episodes are missing."""
+    settings, found = result.settings, result.evaluation
+    called = names(map(Pool.open, settings.folders), found.lost)
+    for scenario, why in found.lost.items():
+        warn(f"UNKNOWN {called[scenario]}: {why}; its episodes are left out")
+    crashed = [e for e in found.episodes if e.get("crashed")]
+    if crashed:
+        remark(f"{settings.name} crashed in {len(crashed)} of {len(found.episodes)} episodes, which are in no rate")
+    if found.earlier:
+        what = "the pools, the settings and the policy are the same; fresh=true repeats them"
+        say(f"{found.earlier} of {len(found.episodes)} episodes are from an earlier run: {what}")
+    return bool(found.lost or crashed)

@@ -1,0 +1,200 @@
+"""draw scenarios, certify them, and store the first n certified ones in a pool"""
+
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+from rich.table import Table
+
+from ...compose import Combination, combinations
+from ...errors import BadConfig, ScengenError, cut
+from ...pool import collection
+from ...runs.generate import GenerateSettings, Summary, generate
+from ...runs.progress import ProgressBar
+from ...samplers.designs import SOBOL
+from ...samplers.split import Split
+from ...samplers.task import Task
+from ...validate.settings import CertifySettings
+from ..tables import attack_table, funnel_table, summary_lines
+from . import FAILED, OK, Arguments, err, intake, out, say, warn
+from .settings import read_task
+
+T = TypeVar("T")
+
+GENERATED = "generated"
+"""Default folder of the pools of a sweep."""
+
+
+MAX_REASONS = 8
+"""Largest number of reasons that an interrupted run prints, as many as the rejection report."""
+REASON_LENGTH = 90
+"""Length up to which the line of progress repeats a reason [characters], as in the rejection report."""
+
+
+REMEDIES = {
+    "was not seen to its end": "leave to_rest out if something never rests, or a rule ends it; see CONTRIBUTING.md",
+}
+"""What the author of a task can do about a reason, by words of it. Certificates hold reasons without remedies."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One pool to make."""
+
+    task: Task
+    certify_settings: CertifySettings
+    settings: GenerateSettings
+
+    def __call__(self) -> Summary:
+        """Make the pool, and print its summary."""
+        task, settings = self.task, self.settings
+        if settings.sampler == "sobol" and settings.n < SOBOL:
+            what = f"in {settings.n} points of a Sobol set some pairs of parameters correlate by chance"
+            warn(f"scengen: {what}, up to 0.95 at 32; give n={SOBOL} or more, or sampler=lhs:{settings.n}")
+        rejections: Counter[str] = Counter()
+        try:
+            with ProgressBar(err, f"{task.name}/{settings.split}", settings.n, settings.workers) as progress_bar:
+
+                def progress(
+                    certified: int, finished: int, verdicts: Mapping[str, int], reasons: Mapping[str, int]
+                ) -> None:
+                    rejections.update({reason: n - rejections[reason] for reason, n in reasons.items()})
+                    progress_bar.show(min(certified, settings.n), _progress_note(finished, verdicts, rejections))
+
+                summary = generate(task, self.certify_settings, settings, progress)
+        except KeyboardInterrupt:
+            for reason, n in rejections.most_common(MAX_REASONS):
+                warn(f"scengen: {n}x {reason}", "yellow")
+            raise
+        out.print(funnel_table(summary.funnel, summary.reasons))
+        if summary.attack is not None:
+            out.print(attack_table(summary.attack))
+        for line in summary_lines(summary):
+            say(line)
+        for words, remedy in REMEDIES.items():
+            if any(words in reason for reason in summary.reasons):
+                say(f"remedy for {words!r}: {remedy}")
+        if summary.certified < settings.n:
+            warn(
+                f"scengen: only {summary.certified} of {settings.n} could be certified among {summary.indices} "
+                "indices; see the reasons above, play one with scengen try, or raise limit="
+            )
+        return summary
+
+
+def command(arguments: Arguments) -> int:
+    asked = combinations("generate", arguments)
+    if not asked[0].swept:
+        (run,) = map(_run, asked)
+        return OK if run().certified == run.settings.n else FAILED
+    asked, found = _valid_runs(asked)
+    runs = _with_folders(asked, found)
+    say(f"{len(runs)} pools: {', '.join(str(run.settings.pool) for run in runs)}")
+    summaries = []
+    for run in runs:
+        summaries.append(run())
+        collection.write_index(summaries[-1].pool.folder.parent, [summaries[-1].pool])
+    out.print(_table(asked, runs, summaries))
+    folder = summaries[-1].pool.folder.parent
+    use = f"pool={folder} stands for all pools in it"
+    say(f"wrote {folder / collection.INDEX}: {use}, in verify, show, report, evaluate")
+    short = any(summary.certified < run.settings.n for run, summary in zip(runs, summaries, strict=True))
+    return FAILED if short else OK
+
+
+def _progress_note(finished: int, verdicts: Mapping[str, int], rejections: "Counter[str]") -> str:
+    """Numbers of indices by verdict, and the most frequent reason of a rejection with its number."""
+    lost = [f"{n} {verdict}" for verdict, n in sorted(verdicts.items()) if verdict != "certified"]
+    note = ", ".join([f"{finished} tried", *lost])
+    if rejections:
+        ((reason, n),) = rejections.most_common(1)
+        note += f" ({n}x {cut(reason, REASON_LENGTH)})"
+    return note
+
+
+def _run(asked: Combination) -> Run:
+    settings, task, certify_settings = read_task("generate", asked.overrides, GenerateSettings)
+    if settings.ycb is not None:
+        task = intake("ycb").with_scans(task, settings.split, settings.ycb)
+    return Run(task, certify_settings, settings)
+
+
+def _valid_runs(asked: Sequence[Combination]) -> tuple[list[Combination], list[Run]]:
+    """The runs of a sweep, all checked before the first one starts.
+
+    A sweep over multiple tasks may name axes of each. A combination of a task with an axis of another task is left out
+    with a warning.
+
+    Raises:
+        BadConfig: a combination is not valid; the message names it.
+    """
+    runs = [_checked(one, _run) for one in asked]
+    kept, lacking = [], []
+    for one, run in zip(asked, runs, strict=True):
+        missing = _checked(one, lambda _, run=run: _missing(run))
+        if missing and any(missing <= other.task.axes.keys() for other in runs):
+            lacking.append(str(one))
+        else:
+            _checked(one, lambda _, run=run: run.settings.check(run.task))
+            kept.append((one, run))
+    if lacking:
+        warn(f"scengen: left out, because the task has no such split: {', '.join(lacking)}", "yellow")
+    return [one for one, _ in kept], [run for _, run in kept]
+
+
+def _missing(run: Run) -> set[str]:
+    """The axes of a run's split that its task does not have."""
+    return {part.axis for part in Split.parse(run.settings.split).parts} - run.task.axes.keys()
+
+
+def _checked(asked: Combination, look: Callable[[Combination], T]) -> T:
+    """Apply a function to a combination.
+
+    Raises:
+        BadConfig: the combination is not valid; the message names it.
+    """
+    try:
+        return look(asked)
+    except ScengenError as error:
+        raise BadConfig(f"{asked}: {error}; no pool was made; leave this combination out") from None
+
+
+def _with_folders(asked: Sequence[Combination], runs: Sequence[Run]) -> list[Run]:
+    """The runs with folders below that of pool=: `<task>-<split>` and the other swept settings.
+
+    Raises:
+        BadConfig: two runs have the same folder.
+    """
+    folders = [
+        Path(run.settings.pool or GENERATED, _folder_name(one, run)) for one, run in zip(asked, runs, strict=True)
+    ]
+    folder, times = Counter(folders).most_common(1)[0]
+    if times > 1:
+        raise BadConfig(f"{times} of the combinations would be written to {folder}; give each value once")
+    return [
+        replace(run, settings=replace(run.settings, pool=str(folder)))
+        for run, folder in zip(runs, folders, strict=True)
+    ]
+
+
+def _folder_name(asked: Combination, run: Run) -> str:
+    """Name of the folder of a combination."""
+    others = [f"{key}={value}" for key, value in asked.swept.items() if key not in ("task", "split")]
+    return re.sub(r"[^\w.+@=,\[\]-]", "_", "-".join([run.task.name, run.settings.split, *others]))
+
+
+def _table(asked: Sequence[Combination], runs: Sequence[Run], summaries: Sequence[Summary]) -> Table:
+    """A table with a line for each pool of a sweep."""
+    names = list(asked[0].swept)
+    table = Table(*names, title=f"{len(runs)} pools", title_justify="left")
+    for column in ("certified", "indices", "CPU s each", "pool"):
+        table.add_column(column, overflow="fold")
+    for one, run, summary in zip(asked, runs, summaries, strict=True):
+        certified = f"{summary.certified} of {run.settings.n}"
+        each = f"{summary.cpu / summary.certified:.1f}" if summary.certified else "-"
+        cells = (certified, str(summary.indices), each, str(summary.pool.folder))
+        table.add_row(*one.swept.values(), *cells, style="red" if summary.certified < run.settings.n else None)
+    return table

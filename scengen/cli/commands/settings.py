@@ -1,0 +1,77 @@
+"""Settings of commands: composed by Hydra, checked, and filled into dataclasses."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from ...compose import certify_node, composed
+from ...errors import BadConfig, cut
+from ...samplers.task import Task, load
+from ...samplers.task_files import groups
+from ...validate.settings import CertifySettings
+from ...work.cluster import AUTO, Cluster
+from ...work.machine import cores
+from ...work.parallel import Workers
+from ...work.typed import typed
+
+T = TypeVar("T")
+
+TASK_SETTINGS = re.compile(r"(\+\+|\+|~)?task\.")
+"""Beginning of overrides that change the task."""
+
+
+def read(verb: str, overrides: Sequence[str], kind: type[T]) -> T:
+    """Read the settings of a command: conf/command/<verb>.yaml with the overrides of a command line, checked.
+
+    Args:
+        kind: dataclass with the names and types of the settings.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    return typed("", kind, _settings(verb, composed(verb, overrides)[0]))
+
+
+def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Task, CertifySettings]:
+    """Read the settings of a command with a task, the task, and the settings of its certificates.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    plain, choices = composed(verb, overrides)
+    settings = typed("", kind, _settings(verb, plain))
+    task = load(choices["task"], plain["task"])
+    certify_settings = typed("certify", CertifySettings, certify_node(plain["certify"], task, choices["certify"]))
+    certify_settings.check()
+    return settings, task, certify_settings
+
+
+def task_overrides(overrides: Sequence[str]) -> list[str]:
+    """Those overrides of a command line that change the task."""
+    return [text for text in overrides if TASK_SETTINGS.match(text)]
+
+
+def _settings(verb: str, plain: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings without those that are chosen from files, such as task and certify."""
+    settings = {key: value for key, value in plain.items() if key not in groups(verb)}
+    for key, value in settings.items():
+        if value == "???":
+            raise BadConfig(f"{verb} needs {key}=...; see scengen {verb} --help")
+    if "workers" in settings:
+        settings["workers"] = _workers(settings["workers"], plain.get("executor"))
+    return settings
+
+
+def _workers(count: Any, executor: Mapping[str, Any] | None) -> Workers:
+    """The workers of a command. `workers=auto` means all cores, of this machine or of the cluster of executor=ray.
+
+    Raises:
+        ScengenError: the count is not a number, or there is no such cluster.
+    """
+    if count != AUTO and (isinstance(count, bool) or not isinstance(count, int)):
+        raise BadConfig(f"workers = {cut(repr(count))}; it must be a whole number, or {AUTO}")
+    if not executor:
+        return cores() if count == AUTO else count
+    cluster = typed("executor", Cluster, {**executor, "count": None if count == AUTO else count})
+    cluster.connect()
+    return cluster

@@ -1,0 +1,72 @@
+"""print the contents of a pool or of one scenario, and draw them"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...errors import BadConfig
+from ...ood.analysis.redraw import task_of
+from ...pictures import film, render
+from ...pictures.sheet import contact_sheet
+from ...pool import Pool
+from ...runs.progress import ProgressBar
+from ...samplers.task_files import search_path
+from ...validate.playable import check_row
+from ...work.limits import at_least
+from ...work.targets import try_file
+from .. import tables
+from . import OK, Arguments, chosen, err, holder, out, remark, say, several, write
+from .settings import read
+
+MAX_DETAILED_POOLS = 3
+"""Largest number of pools whose scenarios are listed. More pools get one line each."""
+
+
+@dataclass(frozen=True)
+class ShowSettings:
+    """Settings of `scengen show`; conf/command/show.yaml explains them."""
+
+    pool: str | list[str]
+    id: str | None
+    to: str | None
+    images: int
+    films: bool
+
+
+def command(arguments: Arguments) -> int:
+    settings = read("show", arguments, ShowSettings)
+    target = Path(settings.to) if settings.to else None
+    if settings.id is None:
+        at_least(settings, images=0)
+        if target and target.suffix != ".html":
+            raise BadConfig(
+                f"to = {target}; give an .html file for a contact sheet, or id= for a film strip of one scenario"
+            )
+        try_file(target)
+        pools = [Pool.open(folder).check() for folder in several(settings.pool)]
+        if len(pools) > MAX_DETAILED_POOLS:
+            out.print(tables.pools_table(pools))
+        else:
+            for pool in pools:
+                out.print(tables.pool_table(pool))
+                out.print(tables.funnel_table(pool.manifest.funnel, pool.manifest.reasons))
+                say(f"pool sha256: {pool.sha256}")
+        if target:
+            with ProgressBar(err, "contact sheet", 1) as bar:
+                made = [(pool, task_of(pool, search_path(arguments))) for pool in pools]
+                if missing := contact_sheet(made, target, settings.images, settings.films, bar.of):
+                    remark(f"{target} has no pictures: {missing}")
+    else:
+        if target and target.suffix != ".png":
+            raise BadConfig(f"to = {target}; give a .png file for the film strip of a scenario")
+        try_file(target)
+        pool = holder(settings.pool, settings.id)
+        row = chosen(pool, settings.id)
+        for table in tables.scenario_tables(row):
+            out.print(table)
+        if target:
+            render.check_pictures()
+            scenario = task_of(pool, search_path(arguments)).scenario(row.params)
+            write(target, render.encode(film.strip(film.Take.witness(check_row(row), scenario)), "png"))
+    if target:
+        say(f"wrote {target}")
+    return OK

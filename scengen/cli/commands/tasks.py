@@ -1,0 +1,44 @@
+"""list the tasks; for one task, its parameters, bounds, splits, axes and what was measured"""
+
+from dataclasses import dataclass
+
+from ... import compose
+from ...errors import UnknownName
+from ...evidence.ledger import latest
+from ...evidence.table import evidence_table
+from ...samplers import task_files
+from ...samplers.task_files import about, search_path
+from ..tables import axes_table, task_tables, tasks_table
+from . import OK, Arguments, out
+from .settings import read
+
+PAPER = "paper"
+"""Value of `axes` for the axes that the paper defines."""
+
+
+@dataclass(frozen=True)
+class TasksSettings:
+    """Settings of `scengen tasks`; conf/command/tasks.yaml explains them."""
+
+    axes: str | None
+
+
+def command(arguments: Arguments) -> int:
+    settings, name = read("tasks", arguments, TasksSettings), compose.chosen_task("tasks", arguments)
+    if settings.axes not in (None, PAPER):
+        raise UnknownName("choice of axes", settings.axes, [PAPER])
+    search = search_path(arguments)
+    listed = [about(each, search) for each in ([name] if name else task_files.tasks(search))]
+    listed.sort(key=lambda task: (task.category[:1] != "P", task.category, task.code))  # the paper's, then ours
+    if name is None and not settings.axes:
+        out.print(tasks_table(listed, {each.name: latest("certified", each.name) for each in listed}))
+        return OK
+    # Loading a task takes 0.1 s of processor time: only these branches print its numbers, which loading checks.
+    others = [a for a in arguments if not a.startswith(("task=", "axes="))]
+    tasks = [compose.load_task(each.name, others) for each in listed if name or each.paper_axes]
+    if settings.axes:
+        out.print(axes_table([(task, axis) for task in tasks for axis in task.axes.values() if task.of_paper(axis)]))
+    else:
+        for table in (*task_tables(tasks[0]), evidence_table(tasks[0])):
+            out.print(table)
+    return OK

@@ -1,0 +1,79 @@
+"""train a small state-based policy on demonstrations: nearest neighbours, behaviour cloning, or MIP"""
+
+from pathlib import Path
+
+from rich.table import Table
+
+from ...compose import load_task
+from ...errors import BadConfig, cut
+from ...export.recording import RecordSettings, record
+from ...learn.data import TrainingData
+from ...learn.train import Trained, TrainSettings, train
+from ...pool.demonstrations import is_demonstrations
+from ...pool.manifest import MANIFEST
+from ...runs.progress import ProgressBar
+from ...samplers.task_files import search_path, tasks
+from . import OK, Arguments, err, out, remark, say
+from .settings import read
+
+RECORDING = "recording"
+"""Folder of the recording of demonstrations, below that of the policy."""
+
+
+def command(arguments: Arguments) -> int:
+    settings = read("train", arguments, TrainSettings)
+    settings.check()
+    recording = _recording(settings, arguments)
+    data = TrainingData.read(recording, settings.observations, settings.demonstrations, settings.task)
+    left_out = ", ".join(f"{count} {why}" for why, count in data.left_out.items() if count)
+    if left_out:
+        remark(f"episodes that are not learned from: {left_out}")
+    search = search_path(arguments)
+    if data.task in tasks(search):
+        if told := load_task(data.task, search).other_version("recorded with", data.task_version):
+            remark(f"{recording} was {told}")
+    with ProgressBar(err, f"train {settings.policy}", settings.epochs) as progress_bar:
+        trained = train(settings, data, lambda done, total, told: progress_bar.of(done, total, told))
+    if not trained.losses:
+        say(f"{settings.to} holds this policy already: same data, same settings")
+    else:
+        out.print(_table(trained))
+        if trained.earlier:
+            say(f"{trained.earlier} of {trained.settings.epochs} epochs are from an earlier run")
+        say(f"wrote {settings.to}: policy.json, weights.npz, loss.svg")
+    say(f"next: scengen evaluate policy={settings.to} pool=...")
+    return OK
+
+
+def _recording(settings: TrainSettings, arguments: Arguments) -> str:
+    """The folder of the recording: `data` itself, or that of its demonstrations, which are recorded first.
+
+    Raises:
+        ScengenError: `data` is neither, or cannot be recorded.
+    """
+    if Path(settings.data, MANIFEST).is_file():
+        raise BadConfig(f"data = {cut(settings.data)} is a pool; make demonstrations with scengen demos, or record it")
+    if not is_demonstrations(settings.data):
+        return settings.data
+    to = Path(settings.to, RECORDING)
+    if not to.exists():
+        wanted = RecordSettings(pool=settings.data, to=str(to), cameras="none")
+        with ProgressBar(err, f"record {settings.data}", 0) as progress_bar:
+            record(wanted, progress_bar.of, search_path(arguments))
+    return str(to)
+
+
+def _table(trained: Trained) -> Table:
+    own, (learned, held_out) = trained.settings, trained.losses[-1]
+    table = Table("", "", title=f"{own.kind} for {own.task}", title_justify="left", show_header=False)
+    for what, told in (
+        ("demonstrations", f"{own.demonstrations}, and {trained.held_out} held out"),
+        ("rows", f"{own.rows}, {own.rate} per second"),
+        ("inputs", f"{own.inputs} of {own.steps} observations of {', '.join(own.streams)}"),
+        ("goals", f"{own.chunk} in a chunk, {own.played} played"),
+        ("epochs", f"{own.epochs}, {trained.seconds:.0f} s of processor time"),
+        ("error of the goals [variances]", f"{learned:.4f}, held out {held_out:.4f}"),
+        ("weights", own.weights_sha256),
+    ):
+        table.add_row(what, told)
+    return table

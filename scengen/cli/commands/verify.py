@@ -1,0 +1,331 @@
+"""check the claims of a pool: rebuild, draw again, replay, and repeat its checks"""
+
+import secrets
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from ... import compose
+from ...attack.campaign import wrong_hits
+from ...attack.check import attacked
+from ...attack.evidence import Hit, unsound
+from ...demos.verify import verify_demonstrations
+from ...errors import BadConfig, UnknownName, cut
+from ...evidence.reproduction import LIMITS as REPRODUCTION_LIMITS
+from ...evidence.reproduction import reproduced
+from ...ood.analysis.redraw import task_of
+from ...pool import Pool
+from ...pool.demonstrations import Demonstrations, demonstration_folders, is_demonstrations
+from ...runs.progress import ProgressBar
+from ...samplers.task import Task
+from ...samplers.task_files import search_path
+from ...samplers.task_files import tasks as list_tasks
+from ...validate.verify.examine import Verdict
+from ...validate.verify.junit import junit
+from ...validate.verify.pools import LIMITS, Options, Report, verify
+from ...validate.verify.recheck import LEVELS
+from ...validate.verify.stored import task_of_manifest as stored_task
+from ...work.limits import at_least
+from ...work.parallel import Limits, WorkerDied, Workers, apart
+from ...work.targets import try_file
+from . import BAD_INPUT, FAILED, OK, Arguments, err, intake, out, say, several, warn, write, write_json
+from .settings import read
+
+ALL = "all"
+"""Value of `task` for all tasks."""
+MAX_PRINTED = 20
+"""Largest number of differences and faults to print; the files hold all."""
+SKIP = "skip"
+"""Value of `others` for a run that checks only its sample."""
+OTHERS = ("check", SKIP)
+"""Values of `others`."""
+STATUS: dict[Verdict, int] = {"sound": OK, "refuted": FAILED, "declined": BAD_INPUT}
+"""Exit status by verdict."""
+WORST = {verdict: STATUS[verdict] for verdict in ("refuted", "declined", "sound")}
+"""Exit status by verdict, in the order in which verdicts decide about multiple pools."""
+
+
+@dataclass(frozen=True)
+class VerifySettings:
+    """Settings of `scengen verify`; conf/command/verify.yaml explains them."""
+
+    pool: str | list[str] | None
+    hits: str | None
+    task: str | None
+    level: str
+    sample: int | None
+    others: str
+    seed: int | None
+    ycb: str | None
+    json: str | None
+    junit: str | None
+    workers: Workers
+    limit_seconds: float
+    limit_mb: int
+
+
+def command(arguments: Arguments) -> int:
+    arguments = without_expired(arguments)
+    # Hydra would look for a file of this name in conf/task, and find none for `all`.
+    tasks = [argument.partition("=")[2] for argument in arguments if argument.startswith("task=")]
+    settings = read("verify", [a for a in arguments if not a.startswith("task=")], VerifySettings)
+    if tasks:
+        return _reproduce(tasks[-1], settings, search_path(arguments))
+    for name, known in (("level", LEVELS), ("others", OTHERS)):
+        if getattr(settings, name) not in known:
+            raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
+    if settings.others == SKIP and settings.sample is None:
+        raise BadConfig(f"others = {SKIP}; it skips the scenarios outside a sample; give sample=N, too")
+    at_least(settings, workers=1, sample=1, seed=0, limit_seconds=1, limit_mb=200)
+    try_file(settings.json)
+    try_file(settings.junit)
+    if settings.hits is not None:
+        return _replay_hits(settings.hits, settings.pool, search_path(arguments))
+    if settings.pool is None:
+        raise BadConfig("verify needs pool=FOLDER, hits=FILE or task=NAME; see scengen verify --help")
+    demonstrated = [f for f in demonstration_folders(settings.pool) if is_demonstrations(f)]
+    if demonstrated:
+        return _replay_demonstrations(demonstrated, settings, search_path(arguments))
+    folders = several(settings.pool)
+    if settings.ycb is not None:
+        for folder in folders:
+            if not Pool.open(folder).manifest.task_node.get("scans"):
+                raise BadConfig(f"ycb = {cut(settings.ycb)}, but {folder} holds no scans; leave it out")
+    limits = Limits(settings.limit_seconds, settings.limit_mb)
+    options = Options(
+        settings.level,
+        settings.sample,
+        settings.others != SKIP,
+        secrets.randbelow(2**32) if settings.seed is None else settings.seed,
+        settings.workers,
+        limits,
+        attacked,
+    )
+    reports: dict[str, Report] = {}
+    plain: dict[str, dict[str, Any]] = {}
+    for folder in folders:
+        pool = Pool.open(folder)
+        with ProgressBar(err, f"verify {folder}", len(pool), settings.workers) as progress_bar:
+            report = verified(pool, options, search_path(arguments), progress_bar.show)
+        report = reports[folder] = _with_scans(report, pool, settings.ycb)
+        about = {key: value for key, value in vars(report).items() if key != "names"}
+        plain[folder] = {"pool_sha256": pool.sha256, **about}
+        _print_report(pool, report)
+    if settings.json:
+        write_json(settings.json, plain[folders[0]] if len(folders) == 1 else plain)
+    if settings.junit:
+        write(Path(settings.junit), junit(reports))
+    verdicts = Counter(report.verdict for report in reports.values())
+    if len(folders) > 1:
+        say(f"{len(folders)} pools: {', '.join(f'{verdicts[v]} {v}' for v in STATUS)}")
+    return next(status for verdict, status in WORST.items() if verdicts[verdict])
+
+
+def without_expired(arguments: Arguments) -> Arguments:
+    """Arguments without the setting `expired`, which has no meaning any more; a hint says so."""
+    kept = [argument for argument in arguments if not argument.startswith("expired=")]
+    if len(kept) < len(arguments):
+        warn("expired= has no meaning any more: certificates belong to a version of their task, which verify compares")
+    return kept
+
+
+def verified(pool: Pool, options: Options, search: Sequence[str], progress: Callable[[int], None]) -> Report:
+    """Check every claim of a pool, including those about attacks on it.
+
+    Args:
+        search: overrides that add folders of other packages, see `task_files.search_path`.
+        progress: called with the number of checked scenarios.
+    """
+    task = compose.load_task(pool.task, search)
+    return _with_hits(
+        verify(pool, task, compose.certify_levels(task), options, progress), pool, task, options.limits or LIMITS
+    )
+
+
+def _with_hits(report: Report, pool: Pool, task: Task, limits: Limits) -> Report:
+    """The report on a pool. If the pool is sound so far, faults of the attack in its manifest are added."""
+    if report.verdict != "sound" or pool.manifest.attack is None:
+        return report
+    verdict: Verdict = "refuted" if pool.manifest.task_version == task.version else "declined"
+    try:
+        found = apart(_wrong_hits, (pool, stored_task(pool, task)), limits, "replaying the hits of its attack")
+    except WorkerDied as error:
+        found, verdict = [("attack", str(error))], "declined"
+    wrong = [{"id": name, "verdict": verdict, "reason": why} for name, why in found]
+    return replace(report, failed=[*report.failed, *wrong], verdict=verdict) if wrong else report
+
+
+def _with_scans(report: Report, pool: Pool, folder: str | None) -> Report:
+    """The report on a pool, with remarks and faults of the scans in its manifest.
+
+    Raises:
+        BadConfig: a folder is given but lacks one of the scans.
+    """
+    scans = pool.manifest.task_node.get("scans", {})
+    if report.verdict != "sound" or not scans:
+        return report
+    solids = f"{len(scans)} solids of scans ({', '.join(scans)})"
+    if folder is None:
+        why = "it is not checked whether they are made of the files that the manifest names; give ycb=FOLDER for that"
+        return replace(report, remarks=[*report.remarks, f"the pool holds {solids}: {why}"])
+    task = task_of(pool)
+    if wrong := intake("ycb").other_files(task, folder):
+        failed = [{"id": "manifest.json", "verdict": "refuted", "reason": why} for why in wrong]
+        return replace(report, failed=[*report.failed, *failed], verdict="refuted")
+    return replace(report, remarks=[*report.remarks, f"{solids} are made of the files in {folder}"])
+
+
+def _wrong_hits(of: tuple[Pool, Task]) -> list[tuple[str, str]]:
+    return list(wrong_hits(*of))
+
+
+def _reproduce(chosen: str, settings: VerifySettings, search: Sequence[str]) -> int:
+    """Compare tasks with their stored behaviour, and print a table.
+
+    Returns:
+        Exit status: 1 if a task has another verdict, draw, scene or rule than stored, 2 if one could not be compared.
+
+    Raises:
+        BadConfig: a setting is given that is for pools.
+        UnknownName: there is no such task.
+    """
+    for name in ("pool", "hits", "sample", "ycb", "junit"):
+        if getattr(settings, name) is not None:
+            raise BadConfig(
+                f"{name} is for pools; task={chosen} compares tasks with their stored behaviour: leave it out"
+            )
+    known = list_tasks(search)
+    names = known if chosen == ALL else [name.strip() for name in chosen.strip("[]").split(",")]
+    for name in names:
+        if name not in known:
+            raise UnknownName("task", name, [*known, ALL])
+    limits = Limits(max(settings.limit_seconds, REPRODUCTION_LIMITS.seconds), settings.limit_mb)
+    with ProgressBar(err, "verify tasks", len(names), settings.workers) as progress_bar:
+        found = sorted(reproduced(names, settings.workers, search, limits, progress_bar.show), key=lambda r: r.task)
+    table = Table("task", "version", "reproduces", "rollouts")
+    for one in found:
+        compared = one.compared
+        table.add_row(
+            one.task,
+            *(
+                (str(compared.version), compared.reproduces, str(compared.rollouts))
+                if compared
+                else ("", "unknown", "")
+            ),
+        )
+    out.print(table)
+    differences = [difference for one in found if one.compared for difference in one.compared.differences]
+    for text in [*(f"{one.task}: {one.why}" for one in found if one.why), *map(str, differences)][:MAX_PRINTED]:
+        warn(text)
+    if (more := len(differences) - MAX_PRINTED) > 0:
+        warn(f"and {more} more differences; json=FILE writes all")
+    if settings.json:
+        write_json(settings.json, [asdict(one) for one in found])
+    counts = Counter(one.compared.reproduces if one.compared else "unknown" for one in found)
+    say(f"{len(found)} tasks: {', '.join(f'{count} {what}' for what, count in counts.items())}")
+    return FAILED if counts["no"] else BAD_INPUT if counts["unknown"] else OK
+
+
+def _replay_hits(hits: str, pool: str | list[str] | None, search: Sequence[str]) -> int:
+    """Replay a hit of the adversary, or all hits in a folder.
+
+    Returns:
+        Exit status.
+    """
+    paths = sorted(Path(hits).glob("*.npz")) if Path(hits).is_dir() else [Path(hits)]
+    if not paths:
+        raise BadConfig(f"hits = {hits}; the folder holds no hits (*.npz); give one that scengen attack wrote")
+    attacked_task = None if pool is None else task_of(Pool.open(str(pool)).check(), search)
+    wrong = 0
+    for path in paths:
+        hit = Hit.load(path)
+        task = attacked_task or compose.load_task(hit.task, search)
+        reason = unsound(hit, task)
+        wrong += bool(reason)
+        say(f"{path.name}: {reason or f'reaches the goal of {hit.scenario} after {hit.seconds:g} s, {hit}'}")
+        if other := task.other_version("found on", hit.task_version):
+            say(f"{path.name}: {other}")
+    say(f"{len(paths) - wrong} of {len(paths)} hits replay")
+    return FAILED if wrong else OK
+
+
+def _replay_demonstrations(folders: Sequence[str], settings: VerifySettings, search: Sequence[str]) -> int:
+    """Verify folders of demonstrations.
+
+    Returns:
+        Exit status.
+
+    Raises:
+        BadConfig: a setting is for pools alone, or a folder is one of a pool.
+    """
+    if others := set(demonstration_folders(settings.pool or "")) - set(folders):
+        raise BadConfig(f"{min(others)} holds no demonstrations; verify pools and demonstrations separately")
+    for name in ("sample", "ycb", "junit"):
+        if getattr(settings, name) is not None:
+            raise BadConfig(f"{name} is for pools; demonstrations are all replayed: leave it out")
+    reports = []
+    for folder in folders:
+        found = Demonstrations.open(folder)
+        limits = Limits(settings.limit_seconds, settings.limit_mb)
+        with ProgressBar(err, f"verify {folder}", len(found), settings.workers) as progress_bar:
+            task, oracle = compose.load_task(found.task, search), settings.level == "full"
+            report = verify_demonstrations(found, task, settings.workers, limits, oracle, progress_bar.show)
+        for fault in report.faults[:MAX_PRINTED]:
+            warn(f"REFUTED {fault[:2000]}")
+        for why in report.declined[:MAX_PRINTED]:
+            warn(f"DECLINED {why[:2000]}")
+        for remark in report.remarks:
+            say(remark)
+        say(f"{folder}: {report.verdict}: {report.exact} of {report.checked} replay bit for bit")
+        reports.append(report)
+    if settings.json:
+        write_json(settings.json, [{**vars(report), "verdict": report.verdict} for report in reports])
+    verdicts = Counter(report.verdict for report in reports)
+    return next(status for verdict, status in WORST.items() if verdicts[verdict])
+
+
+def _print_report(pool: Pool, report: Report) -> None:
+    """Print differences, faults, remarks and counts of a report."""
+    if report.differences:
+        table = Table("key", "in the pool", "installed", title="the task of this pool differs from the installed file")
+        for d in report.differences[:MAX_PRINTED]:
+            table.add_row(d["key"], d["pool"], d["installed"])
+        out.print(table)
+        if (more := len(report.differences) - MAX_PRINTED) > 0:
+            say(f"and {more} more; json=FILE writes all")
+    for failure in report.failed[:MAX_PRINTED]:
+        name = report.names.get(failure["id"], failure["id"])
+        warn(f"{failure['verdict'].upper()} {name}: {failure['reason'][:2000]}")
+    if (more := len(report.failed) - MAX_PRINTED) > 0:
+        warn(f"and {more} more faults; json=FILE writes all")
+    for remark in report.remarks:
+        say(remark)
+    done = [
+        f"{n} {what}"
+        for n, what in (
+            (report.rebuilt, "rebuilt and drawn again"),
+            (report.replayed, "replayed"),
+            (report.rechecked, "checked again without an oracle"),
+            (report.certified_again, "certified again"),
+            (report.left_out, "left out and certified again"),
+            (report.claimed, "claimed against another version of the task"),
+            (report.drifted, "end in other bits"),
+        )
+        if n
+    ]
+    if report.claimed_checks:
+        told = f"not made again at level {report.level}, and claimed: {', '.join(report.claimed_checks)}"
+        say(f"{told}; level=full makes them again")
+    say(f"settings: {report.settings or 'unknown'}")
+    if pool.manifest.is_subset:
+        say("a subset: its scenarios were chosen from another pool, and its rejection report is that of the other pool")
+    if report.sample:
+        share, size, seed = (report.sample[name] for name in ("excluded_share", "size", "seed"))
+        bound = f"a share of {100 * share:.3g} % or more of rows that fail this level is excluded at 95 %"
+        say(f"sample: {size} of {len(pool)} scenarios simulated, seed {seed}; without a fault, {bound}")
+    parts = ", ".join([f"{report.sound} sound, {report.refuted} refuted, {report.declined} declined", *done])
+    say(f"{pool.folder}: {report.verdict} at level {report.level}: {parts}")

@@ -1,0 +1,201 @@
+"""The strictest check of an episode: its actions, played again, must give the recorded states and pictures."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...control.loop import ACTION
+from ...envs.object_state import ObjectState
+from ...envs.observations import cameras_of, streams_of
+from ...episode import Episode, Rules
+from ...errors import ScengenError
+from ...export.dataset import rules_of
+from ...export.lerobot import IMAGES_PREFIX
+from ...export.recording import CONTROL_ACTIONS
+from ...export.streams import ENVIRONMENT
+from ...pictures.render import Camera, NoPictures, Picture
+from ...samplers.task import Task
+from ...scenario import Scenario
+from ...sim.embodiment import hands
+from ...sim.world import World
+from ...validate.rebuilt import rebuild
+from .findings import Finding
+from .videos import Probe, compared, stands_still
+
+MAX_REPLAY_ERROR = 1e-6
+"""Largest difference of a stream [its unit], and relative to a value beyond 1: streams are stored in single
+precision."""
+FIRST = "_pos.x"
+"""End of the name of a body's first entry in the environment state."""
+STREAMS = ("eef_pos", "eef_quat", "joint_pos", "gripper_qpos")
+"""Streams that are compared, without the arm's prefix."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What a replay needs of an episode; it goes to another process."""
+
+    number: int
+    task: Task
+    params: Mapping[str, Any]
+    horizon: float
+    rules: Rules
+    actions: NDArray[np.float32]
+    """Actions of all control periods of each row, shape (rows, periods, 7 * arms)."""
+    streams: Mapping[str, NDArray[np.float32]]
+    """Streams at the beginning of each row."""
+    entries: tuple[str, ...]
+    """Names of the entries of the environment state; empty if it was not recorded."""
+    size: tuple[int, int]
+    """Width and height of the pictures [pixels]."""
+    films: Mapping[str, tuple[Probe, ...]]
+    """Parts of the film of each camera."""
+    frozen: Mapping[str, Finding]
+    """The finding of each camera whose picture stands still while the arm moves. It holds if that of the replay moves,
+    and if there is none."""
+
+    @classmethod
+    def of(
+        cls,
+        number: int,
+        task: Task,
+        about: Mapping[str, Any],
+        columns: Mapping[str, NDArray[Any]],
+        entries: Sequence[str],
+        size: tuple[int, int],
+        films: Mapping[str, tuple[Probe, ...]],
+        frozen: Mapping[str, Finding],
+    ) -> "Recorded":
+        """The parts of an episode that a replay compares.
+
+        Args:
+            entries: names of the entries of the environment state; empty if it was not recorded.
+
+        Raises:
+            ScengenError: there are no such rules.
+            ValueError: its parameters are not JSON.
+        """
+        states = {name: values for name, values in columns.items() if name.endswith(STREAMS) or name == ENVIRONMENT}
+        params, horizon = json.loads(about["scengen/params"]), float(about["scengen/horizon"])
+        actions, entries = columns[CONTROL_ACTIONS], tuple(entries)
+        return cls(number, task, params, horizon, rules_of(about), actions, states, entries, size, films, frozen)
+
+    def readers(self) -> dict[str, Callable[[World], NDArray[Any]]]:
+        """Functions that read the streams from a world."""
+        robot = self.task.embodiment
+        found: dict[str, Callable[[World], NDArray[Any]]] = {n: stream.read for n, stream in streams_of(robot).items()}
+        if self.entries:
+            own = [
+                name.removesuffix(FIRST) for name in self.entries if name.endswith(FIRST) and "_to_robot" not in name
+            ]
+            bodies = {body: f"{body}_vel_lin.x" in self.entries for body in own}
+            found[ENVIRONMENT] = ObjectState(bodies, len(hands(robot))).read
+        return found
+
+
+def difference(read: NDArray[np.float64], stored: NDArray[np.float32]) -> float:
+    """Largest difference of a reading from a stored one, in relation to values beyond 1."""
+    return float((np.abs(read - stored) / np.maximum(1.0, np.abs(stored))).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """What the replay of an episode finds."""
+
+    findings: tuple[Finding, ...] = ()
+    checks: tuple[str, ...] = ("replay",)
+    """Names of the checks that were made."""
+
+
+def replayed(recorded: Recorded) -> Replayed:
+    """Play an episode again, and compare states, success and pictures."""
+    try:
+        return _replayed(recorded)
+    except (ScengenError, ValueError, TypeError, KeyError) as error:
+        return _fault(recorded, f"the episode cannot be replayed: {' '.join(str(error).split())[:200]}")
+
+
+def comparison_of(camera: str) -> str:
+    """Name of the check that compares a film with pictures of the replay."""
+    return f"pictures {camera}"
+
+
+def lost(recorded: Recorded, reason: str) -> Replayed:
+    """The finding of a replay that has crashed its process, or has reached a limit."""
+    return _fault(recorded, f"replaying it {reason}")
+
+
+def _fault(recorded: Recorded, explanation: str, row: int | None = None, **numbers: float) -> Replayed:
+    frames = () if row is None else (row, row)
+    return Replayed((Finding("REPLAY", "error", frames, numbers, explanation), *recorded.frozen.values()))
+
+
+def _replayed(recorded: Recorded) -> Replayed:
+    task = recorded.task
+    scenario, robot = task.scenario(recorded.params), task.embodiment
+    world, readers = World.load(rebuild(scenario), robot, visual=bool(recorded.films)), recorded.readers()
+    if recorded.actions.shape[2] != ACTION * len(hands(robot)):
+        return _fault(recorded, f"the actions are not those of {robot}")
+    with ExitStack() as stack:
+        films = _Films(recorded, scenario, world, stack)
+        episode = Episode(scenario, world, recorded.horizon, recorded.rules)
+        for row, actions in enumerate(recorded.actions):
+            for name, values in recorded.streams.items():
+                error = difference(readers[name](world), values[row])
+                if not error <= MAX_REPLAY_ERROR:
+                    return _fault(
+                        recorded, f"replayed, {name} has other values", row, error=error, limit=MAX_REPLAY_ERROR
+                    )
+            films.compare(row)
+            for action in actions:
+                episode.step(action)
+    if episode.outcome != "success":
+        return _fault(recorded, f"replayed, the goal is not reached: {episode.reason or 'no outcome'}")
+    return Replayed(films.findings, ("replay", *films.checks))
+
+
+class _Films:
+    """The films of an episode beside pictures of its replay. Without OpenGL none is compared."""
+
+    def __init__(self, recorded: Recorded, scenario: Scenario, world: World, stack: ExitStack):
+        self._held, self._camera = scenario.orientation, None
+        self._probes: dict[tuple[str, int], Probe] = {}
+        self._differences: dict[str, list[NDArray[np.float64]]] = {}
+        self._frozen, self._ends = recorded.frozen, dict[str, list[Picture]]()
+        if recorded.films:
+            with suppress(NoPictures):
+                self._camera = Camera(world, *recorded.size)
+                stack.callback(self._camera.close)
+                self._views = cameras_of(recorded.task.embodiment)
+                self._differences = {key: [] for key in recorded.films}
+                self._probes = {(key, each.row): each for key, probes in recorded.films.items() for each in probes}
+
+    def compare(self, row: int) -> None:
+        """Take the pictures of a row anew, if it is one of those to be compared."""
+        for key in self._differences:
+            probe, frozen = self._probes.get((key, row)), self._frozen.get(key)
+            if probe is None and (frozen is None or row not in frozen.frames):
+                continue
+            assert self._camera is not None
+            picture = self._held.apply(self._camera.take(self._views[key.removeprefix(IMAGES_PREFIX)]))
+            if probe:
+                self._differences[key].append(probe.differences(picture))
+            if frozen and row in frozen.frames:
+                self._ends.setdefault(key, []).append(picture)
+
+    @property
+    def checks(self) -> list[str]:
+        """Names of the checks that were made."""
+        return [comparison_of(key) for key in self._differences]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the comparison of all rows has found."""
+        shifts = [one for key, told in self._differences.items() for one in compared(key, told)]
+        still = [key for key, ends in self._ends.items() if stands_still(ends[0], ends[-1])]
+        return (*shifts, *(one for key, one in self._frozen.items() if key not in still))

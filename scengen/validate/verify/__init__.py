@@ -1,0 +1,1 @@
+"""Verification of pools by their claims alone, without an oracle."""
