@@ -61,7 +61,7 @@ class Edge:
     def of(cls, plain: Sequence[Any], known: Sequence[str]) -> Self:
         """The reverse of `plain`."""
         start, pairs, *sides = plain
-        before, after = (tuple(known[number] for number in side) for side in sides)
+        before, after = (tuple(known[int(number)] for number in side) for side in sides)
         return cls(start, {name: (low, high) for name, (low, high) in pairs.items()}, before, after)
 
     def again(self, start: Scenario) -> "Edge":

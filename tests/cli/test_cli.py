@@ -102,9 +102,9 @@ def test_an_old_name_runs_the_new_command_and_says_so(capsys, monkeypatch, old, 
         import_module(f"scengen.cli.commands.{file_stem(new)}"), "command", lambda arguments: run.append(arguments) or 0
     )
     status, err = said(capsys, old, "pool=here")
-    assert status == 0 and run == [["pool=here"]]
+    assert status == 0 and run == [("pool=here",)]
     assert err == f"scengen: `{old}` is now `{new}`; the old name goes with 0.4\n"
-    assert cli.run(("--help",)) == 0 and f"  {old} " not in capsys.readouterr().out
+    assert cli.run(("--help",)) == 0 and f"\n  {old} " not in capsys.readouterr().out
     assert old not in cli.VERBS and old not in completions(f"scengen {old}", cli.VERBS)
 
 
@@ -284,14 +284,14 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
     [
         ("generate", generate.GenerateSettings, {}),
         ("demos", DemosSettings, {}),
-        ("probe", axis_card.AxisSettings, {"axis": "diagonal"}),
-        ("discover", discovery.DiscoverSettings, {}),
+        ("axis card", axis_card.AxisSettings, {"axis": "diagonal"}),
+        ("axis discover", discovery.DiscoverSettings, {}),
         ("evaluate", EvaluateSettings, {"policy": "idle", "pool": "here"}),
         ("record", recording.RecordSettings, {"pool": "here", "to": "there"}),
     ],
 )
 def test_python_and_the_command_line_have_the_same_defaults(verb, kind, given):
-    task = ["task=domino_single"] if verb in ("generate", "demos", "probe", "discover") else []
+    task = ["task=domino_single"] if verb in ("generate", "demos", "axis card", "axis discover") else []
     assert read(verb, [*task, *(f"{name}={value}" for name, value in given.items())], kind) == kind(**given)
 
 

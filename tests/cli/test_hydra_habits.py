@@ -88,9 +88,9 @@ def test_a_sweep_makes_a_pool_for_each_combination_and_is_continued(capsys, tmp_
 
 
 def test_other_commands_say_that_they_take_one_value(capsys):
-    status, shown = said(capsys, "shrink", DOMINO, "index=0,1")
+    status, shown = said(capsys, "axis", "shrink", DOMINO, "index=0,1")
     assert status == 2 and "has multiple values; give one" in shown.err
-    assert said(capsys, "shrink", "-m", DOMINO)[1].err.startswith("scengen: '-m' is not an option")
+    assert said(capsys, "axis", "shrink", "-m", DOMINO)[1].err.startswith("scengen: '-m' is not an option")
 
 
 # --- what a command would work with ----------------------------------------------------------

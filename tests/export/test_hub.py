@@ -142,7 +142,7 @@ def test_a_certificate_that_does_not_hold_gets_no_card(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ([], "publish needs pool=...; see scengen export hub --help"),
+        ([], "export hub needs pool=...; see scengen export hub --help"),
         (["pool=nowhere"], "no pool at nowhere"),
         ([f"pool={REFERENCE}", f"to={REFERENCE}"], "is not empty; delete it, or name another folder"),
         ([f"pool={REFERENCE}", "level=all"], "level = all; it must be replay or recheck or full"),

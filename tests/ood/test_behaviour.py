@@ -98,7 +98,7 @@ def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
         (("axis=diagonal", "belief_n=51"), "belief_n = 51; it must be from 0 to n = 50"),
         (("axis=diagonal", "any_n=-1"), "any_n = -1; it must be from 0 to n = 50"),
         (("axis=diagonal", "n=10", "certify_n=20"), "certify_n = 20; it must be from 0 to n = 10"),
-        ((), "probe needs axis=..."),
+        ((), "axis card needs axis=..."),
     ],
 )
 def test_bad_input_is_told_in_one_line(argv, says, capsys, tmp_path):
