@@ -39,7 +39,7 @@ from . import edges, rules
 from .episodes import episodes_sha256
 from .rollouts import Stage
 
-FORMAT = 4
+FORMAT = 5
 """Format of a behaviour file, which includes the rollouts and states of which it consists."""
 SEED = 7
 """Seed of the draws."""
@@ -287,6 +287,7 @@ def _answers(
         "answers": book.numbers(probe.answers()),
         "numbers": probe.numbers(),
         "contacts": list(rules.under_contacts(probe)),
+        "swept": list(rules.swept(probe, along)),
         "mixed": list(rules.under_mixtures(probe, number, along)),
         "state": state,
     }

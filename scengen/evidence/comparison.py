@@ -178,7 +178,7 @@ def _rules(task: str, stored: Behaviour, now: Mapping[str, Any]) -> Iterator[Dif
         for part, kind in enumerate(RULES):
             if was["answers"][part] != here["answers"][part]:
                 yield Difference(task, kind, f"state {number}", told[0][part], told[1][part], "version")
-            for how in ("contacts", "mixed"):
+            for how in ("contacts", "swept", "mixed"):
                 if was[how][part] != here[how][part]:
                     yield Difference(task, kind, f"state {number}, {how}", was[how][part], here[how][part], "version")
         if was["numbers"] != here["numbers"]:

@@ -33,6 +33,8 @@ MAX_LIMITS = 2
 """Largest number of limits that are stored for the same change of answer along the same coordinate."""
 MAX_TOGGLES = 16
 """Largest number of contacts that are added or removed, singly and in pairs."""
+SWEPT = {"place": (0.02, 0.1, 0.5), "all": (0.02, 0.1, 0.5), "memory": (1.0, 100.0), "time": (1.0, 100.0)}
+"""Sizes of changes with all or none of the contacts, by kind of coordinate: a limit may appear that was not there."""
 MIXED = 120
 """Number of states with several random changes at once, for each stored state."""
 BISECTIONS = 34
@@ -406,6 +408,12 @@ def under_contacts(probe: Probe) -> tuple[str, str]:
     """Hashes of the answers with contacts turned around, singly and in pairs."""
     sets = [(contact,) for contact in probe.contacts] + list(combinations(probe.contacts, 2))
     return _hashes([probe.answers(contacts=turned) for turned in sets])
+
+
+def swept(probe: Probe, along: Sequence[Coordinate]) -> tuple[str, str]:
+    """Hashes of the answers with all or none of the contacts under changes of `SWEPT`."""
+    places = [Place(c, contacts) for contacts in ("none", "all") for c in along if c.kind in SWEPT]
+    return _hashes([probe.at(place, size) for place in places for size in SWEPT[place.coordinate.kind]])
 
 
 def under_mixtures(probe: Probe, state: int, along: Sequence[Coordinate]) -> tuple[str, str]:
