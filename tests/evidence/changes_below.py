@@ -243,6 +243,7 @@ EDITS = (
             ),
         ),
         RULE,
+        misjudged="in no stored state does something touch the cube while it is high enough and still",
     ),
     Edit(
         "touch_now_instead_of_ever",

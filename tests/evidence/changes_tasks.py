@@ -117,7 +117,6 @@ EDITS = (
         ("mirror_pick_place",),
         ((MIRROR, "MIN_PICTURE_OFFSET = 0.12\n", "MIN_PICTURE_OFFSET = 0.1224\n"),),
         ("constraint",),
-        misjudged="two parameters must change at once, and no stored proposal is refuted for this reason",
     ),
     Edit(
         "constraint_of_a_reach",
@@ -181,6 +180,7 @@ EDITS = (
         ("steps",),
         least="bits",
         longer=True,
+        misjudged="with the three tiles of the stored draw both steps are the same",
     ),
     Edit(
         "question_about_the_scene",
