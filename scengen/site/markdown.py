@@ -18,7 +18,7 @@ PAGES = (
     "CHANGELOG.md",
     "docs/*.md",
     "docs/*/*.md",
-    "example/README.md",
+    "task_template/README.md",
     "integrations/*/README.md",
 )
 """Pages of a repository."""
