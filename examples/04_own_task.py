@@ -4,9 +4,7 @@
 from dataclasses import dataclass
 
 import scengen
-from scengen.assets.box import Cube
-from scengen.assets.patch import Patch
-from scengen.assets.prop import TABLE_TOP, place, table
+from scengen.assets import box, patch, prop
 from scengen.predicates import rests_on
 from scengen.samplers.task import load
 from scengen.skills.jaw import pick, put
@@ -18,9 +16,9 @@ class Deliver(scengen.Scenario):
     y: float = scengen.param(0.15, "m", -0.3, 0.3)  # the place of the patch
 
     def build(self):
-        scene = table()
-        place(scene, Cube(edge=0.04), "cube", [-0.05, -0.10, TABLE_TOP])
-        place(scene, Patch(size=0.10), "patch", [0.0, self.y, TABLE_TOP], free=False)
+        scene = prop.table()
+        prop.place(scene, box.Cube(edge=0.04), "cube", [-0.05, -0.10, prop.TABLE_TOP])
+        prop.place(scene, patch.Patch(size=0.10), "patch", [0.0, self.y, prop.TABLE_TOP], free=False)
         return scene
 
     def success(self, world):

@@ -8,7 +8,7 @@ from scengen.cli import run
 
 POOL, FOLDER = Path(__file__).parents[1] / "generated" / "reference", "generated/examples"
 COMMANDS = [
-    f"demos task=domino_single n=12 styles=[nominal] apart={POOL} to={FOLDER}/demos",  # none of a scenario of the pool
+    f"demos task=domino_single n=10 styles=[nominal] apart={POOL} to={FOLDER}/demos",  # none of a scenario of the pool
     f"train policy=bc data={FOLDER}/demos members=1 epochs=60 to={FOLDER}/policy",
     f"evaluate policy={FOLDER}/policy pool={POOL} seeds=3 rollouts=1 to={FOLDER}/evaluation",  # pool=A,B adds an axis
 ]

@@ -12,8 +12,6 @@ import numpy as np
 
 from scengen.cli import run
 
-POOL = Path(__file__).parents[1] / "generated" / "reference"
-
 
 def answer(prompt):
     things = dict(re.findall(r"(.+): position \[(.*?)\]", prompt))
@@ -29,15 +27,13 @@ class Server(BaseHTTPRequestHandler):
     def do_POST(self):
         body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
         name, arguments = answer(body["messages"][-1]["content"])
-        call = {"function": {"name": name, "arguments": json.dumps({**arguments, "reasoning": "scripted"})}}
-        self.send_response(200)
-        self.end_headers()
-        self.wfile.write(json.dumps({"choices": [{"message": {"tool_calls": [call]}}]}).encode())
-
-    def log_message(self, *_): ...
+        call = {"function": {"name": name, "arguments": json.dumps(arguments)}}
+        completion = {"choices": [{"message": {"tool_calls": [call]}}]}
+        self.wfile.write(b"HTTP/1.0 200 OK\r\n\r\n" + json.dumps(completion).encode())
 
 
 server = HTTPServer(("127.0.0.1", 0), Server)
 threading.Thread(target=server.serve_forever, daemon=True).start()
-url, to = f"url=http://127.0.0.1:{server.server_port}/v1", "to=generated/examples/agent"
-sys.exit(run(["agent", "stage=3", "mode=poses", "pictures=false", "model=mine", "seeds=2", f"pool={POOL}", url, to]))
+port, pool = server.server_port, Path(__file__).parents[1] / "generated" / "reference"
+command = f"agent stage=3 mode=poses pictures=false model=mine seeds=2 to=generated/examples/agent-{port}"
+sys.exit(run([*command.split(), f"url=http://127.0.0.1:{port}/v1", f"pool={pool}"]))

@@ -34,9 +34,10 @@ class Pool(StoredRows[Manifest, PoolRow]):
 
     def _repr_html_(self) -> str:
         """Its first scenarios, in a notebook."""
-        rows = self.columns("index", "id", "shifted", "instruction")
+        values = ("params", "parameters") if self.split == "id" else ("shifted", "changed by the axis")
         title = f"{self.folder}: {len(self)} certified scenarios of {self.task}/{self.split}"
-        return html_tables.table(title, ("index", "id", "changed by the axis", "instruction"), rows, len(self))
+        rows = self.columns("index", "id", values[0])
+        return html_tables.table(title, ("index", "id", values[1]), rows, len(self))
 
     def rejects(self) -> Iterator[PoolRow]:
         """Scenarios that were kept although they were not certified (`keep=`), in the order of their indices.

@@ -18,6 +18,7 @@ PAGES = (
     "CHANGELOG.md",
     "docs/*.md",
     "docs/*/*.md",
+    "examples/README.md",
     "task_template/README.md",
     "integrations/*/README.md",
 )
@@ -28,6 +29,8 @@ FILES = (
     "docs/*.svg",
     "docs/*/*.jpg",
     "docs/*/*.png",
+    "examples/*.py",
+    "examples/*.ipynb",
     "LICENSE",
     "CITATION.cff",
     "Dockerfile",
