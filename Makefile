@@ -23,7 +23,7 @@ demo: setup
 	$(BIN)/scengen verify pool=$(DEMO)/diagonal workers=2
 	$(BIN)/scengen show pool=$(DEMO)/id,$(DEMO)/diagonal to=$(DEMO)/contact_sheet.html films=true
 
-# What continuous integration runs. The slow tests certify a training scenario of every task; the certified sample is the
+# What continuous integration runs. The slow tests play the stored behaviour of every task; the certified sample is the
 # paper's eight OOD conditions, which lie in eight categories. What runs on one core runs two at a time.
 OOD_TASKS := sheltered_grasp pendulum_grasp domino_single tool_retrieve occluder_push slip_recovery balance_medium keyboard_typing
 OOD_SPLITS := opposite_side plane_45 diagonal mirrored_hook stacked_lids two_slips turned unseen_words
@@ -49,11 +49,11 @@ wheel:
 	$(WHEEL)/env/bin/pip install --quiet --disable-pip-version-check --constraint constraints.txt "$$(ls $(WHEEL)/*.whl)[all]"
 	cd $(WHEEL) && sh $(CURDIR)/tools/try_wheel.sh
 
-# Tests that take some seconds each, such as one certificate per task (15 minutes). Many of them wait, hence three at a time.
+# Tests that take some seconds each, and the stored behaviour of every task (10 minutes). Many wait, hence three at a time.
 slow: setup
 	$(BIN)/python -m pytest -n 3 --dist loadgroup -m "slow and not long"
 
-# Tests that take 7 s or more each, such as coverage of intervals and the corpus of false pools. Run them before a release.
+# Tests that take 4 s or more each, such as one certificate per task and the corpus of false pools. Run them before a release.
 long: setup
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m long
 
@@ -118,7 +118,7 @@ INTEGRATIONS ?=
 integrations: setup
 	$(BIN)/python tools/check_integrations.py $(INTEGRATIONS)
 
-# Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen probe, and names of tasks to select them.
+# Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen axis card, and names of tasks to select them.
 AXES ?= n=50
 axes: setup
 	$(BIN)/python tools/all_axes.py $(AXES)

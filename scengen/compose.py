@@ -26,7 +26,17 @@ from omegaconf.errors import OmegaConfBaseException
 
 from .errors import BadConfig, UnknownName, cut
 from .samplers.task import Task, load
-from .samplers.task_files import ORIGINS, category, conf_dir, groups, is_folder, packages, search_path, tasks
+from .samplers.task_files import (
+    ORIGINS,
+    category,
+    command_file,
+    conf_dir,
+    groups,
+    is_folder,
+    packages,
+    search_path,
+    tasks,
+)
 from .validate.settings import CertifySettings
 from .work.typed import typed
 
@@ -145,7 +155,8 @@ def config_dir(verb: str) -> Path:
 
 def config_name(verb: str) -> str:
     """Name of the file of a command in its `config_dir`."""
-    return f"command/{verb}" if groups(verb) else verb
+    file = command_file(verb).stem
+    return f"command/{file}" if groups(verb) else file
 
 
 def as_yaml(verb: str, overrides: Sequence[str]) -> str:

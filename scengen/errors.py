@@ -37,6 +37,10 @@ class Infeasible(ScengenError):
         super().__init__(f"{where}: none of {tries} draws was feasible ({told}); widen the distributions")
 
 
+class NoRobot(ScengenError):
+    """The robot's files are missing, or are not those of robosuite's release."""
+
+
 class PoolError(ScengenError):
     """A pool is missing, damaged or locked, or does not belong to the run that wants to write it."""
 

@@ -30,7 +30,7 @@ def memory_is_given_back():
 
 DURATIONS = Path(__file__).parent / "durations.txt"
 """Processor times [s] and ids of the tests that take at least `SLOW`, a line each. Written by `make durations`."""
-SLOW, LONG = 1.5, 7.0
+SLOW, LONG = 1.5, 4.0
 """Processor time from which a test is run by `make slow`, and from which it is run by `make long` alone [s]. The mark
 `slow(each_change=True)` keeps a longer test among the slow ones."""
 STARTED = pytest.StashKey[float]()

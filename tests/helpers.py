@@ -48,9 +48,15 @@ def certified_here(pool):
         pytest.skip(f"{pool.name} was certified under MuJoCo {made}")
 
 
+def needs_robosuite():
+    """Skip a test, or a file of tests, where robosuite's environments do not run."""
+    reason = "robosuite does not run here; it is an extra"
+    pytest.importorskip("scengen.envs.robosuite_models", reason=reason, exc_type=ImportError)
+
+
 def env_class(task, search=()):
-    """The class of a task's environments in robosuite. Without robosuite the test is skipped."""
-    pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+    """The class of a task's environments in robosuite. Where they do not run, the test is skipped."""
+    needs_robosuite()
     from scengen.envs.robosuite import env_class
 
     return env_class(task, search)

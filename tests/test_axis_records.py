@@ -82,7 +82,9 @@ def test_a_learner_is_judged_by_all_its_trainings(empty):
 def test_a_card_of_an_earlier_format_is_told_with_the_remedy(tmp_path):
     path = tmp_path / "card.json"
     path.write_text(json.dumps({"task": "domino_single", "axis": "diagonal", "baselines": []}))
-    with pytest.raises(BadConfig, match=r"format 1; .* scengen probe task=domino_single axis=diagonal writes it again"):
+    with pytest.raises(
+        BadConfig, match=r"format 1; .* scengen axis card task=domino_single axis=diagonal writes it again"
+    ):
         read_card(path)
     path.write_text(json.dumps({"format": FORMAT, "task": "domino_single", "axis": "diagonal"}))
     assert read_card(path)["axis"] == "diagonal"

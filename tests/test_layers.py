@@ -10,7 +10,7 @@ import pytest
 import scengen
 
 LAYERS = (
-    ("errors", "geometry", "versions", "compat", "certificate"),
+    ("errors", "geometry", "installation", "compat", "certificate"),
     ("html_tables", "orientation", "params", "physics", "symmetry"),
     ("robots",),
     ("control",),
@@ -33,8 +33,8 @@ LAYERS = (
 )
 """Packages and modules of scengen from the ground up. Those of one line must not import each other."""
 WINGS = {
-    "core": """errors geometry versions compat html_tables orientation params physics symmetry robots control sim assets
-        predicates scenario episode skills samplers tasks work compose""",
+    "core": """errors geometry installation compat html_tables orientation params physics symmetry robots control sim
+        assets predicates scenario episode skills samplers tasks work compose""",
     "proof": "certificate validate attack evidence conformance",
     "data": "pool runs demos export intake",
     "study": "learn evaluate ood agents bench drift",

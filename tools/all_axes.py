@@ -44,8 +44,8 @@ measured on version N* says that there are none yet for the task as it is. The f
 {training}
 ## Axes
 
-Each line summarizes one axis card (`scengen probe`) and what else was tried on the axis; each column states its sample
-size. {verdicts}
+Each line summarizes one axis card (`scengen axis card`) and what else was tried on the axis; each column states its
+sample size. {verdicts}
 
 * **outside**: smallest gap between axis and training over the moved parameters [widths of the training range].
   **physics**: features declared by the family that leave training (sampled, 300 draws).

@@ -85,7 +85,7 @@ COLUMNS = ("task", "split", "policy", "solved", "rate [%]", "why not")
 FAILURES = """
 ## What fails in training
 
-What failures are (`scengen evaluate keep=[episodes]`, `scengen film`, and the states that were passed):
+What failures are (`scengen evaluate keep=[episodes]`, `scengen show film`, and the states that were passed):
 
 * `balance_medium`: the hand lets the rod go 4 to 15 mm beside the middle of the ridge, which is 12 mm wide.
 * `tool_retrieve`: the hook passes beside the cube or leaves it behind half way, and the hand creeps on with it.

@@ -14,6 +14,8 @@ from pathlib import Path
 
 from stacks import found_python
 
+from scengen.installation import ROBOSUITE
+
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build" / "integrations"
 SPLITS = {"id": 10, "diagonal": 10}
@@ -47,7 +49,9 @@ def checked(name: str, interpreter: str) -> bool:
     if not python.exists():
         shutil.rmtree(home, ignore_errors=True)
         run(interpreter, "-m", "venv", home)
-    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", ROOT, here)
+    install = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    run(*install, ROOT, here)
+    run(*install, "--no-deps", f"robosuite=={ROBOSUITE}")  # the robot's files
     print(f"{name}:", flush=True)
     return subprocess.run([python, here / "check.py", *pools(home)], cwd=FOLDER).returncode == 0
 

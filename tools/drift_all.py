@@ -31,10 +31,10 @@ LEVEL = "recheck"
 PAGE = Path("docs/drift.md")
 HEAD = """# Verdicts under other versions of MuJoCo
 
-Written by `make drift`: the results of `scengen drift` on training scenarios of every task and on some of one axis (the
-paper's where the task has one). Each version of MuJoCo has an environment of its own, made by venv and pip and kept in
-`~/.cache/scengen`. Everything else in it (Python, numpy, numba, scengen itself) is that of the running environment, so
-only MuJoCo differs.
+Written by `make drift`: the results of `scengen verify mujoco` on training scenarios of every task and on some of one
+axis (the paper's where the task has one). Each version of MuJoCo has an environment of its own, made by venv and pip
+and kept in `~/.cache/scengen`. Everything else in it (Python, numpy, numba, scengen itself) is that of the running
+environment, so only MuJoCo differs.
 
 * **same bits**: the witness ends in the same bits, and every repeated check agrees with the certificate.
 * **same verdict**: every repeated check agrees with the certificate; the witness ends in other bits.

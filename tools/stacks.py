@@ -3,8 +3,9 @@
     python tools/stacks.py sample                    # one small sample on MuJoCo 4, for CI
     python tools/stacks.py all [STACK ...]           # quick tests, and one scenario of each task
 
-Each stack has an environment below build/stacks, into which pip resolves scengen without overrides. A stack whose
-Python is missing is reported as not tried. Results are stored in records/stacks.
+Each stack has an environment below build/stacks, into which pip resolves scengen without overrides. robosuite, from
+which the robot's files are read, is installed without its requirements. A stack whose Python is missing is reported as
+not tried. Results are stored in records/stacks.
 """
 
 import json
@@ -15,6 +16,8 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from scengen.installation import ROBOSUITE
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build" / "stacks"
@@ -79,7 +82,9 @@ def made(stack: Stack, interpreter: str) -> Path:
         shutil.rmtree(folder, ignore_errors=True)
         subprocess.run([interpreter, "-m", "venv", folder], check=True)
         told = ["--quiet", "--disable-pip-version-check"]
-        subprocess.run([python, "-m", "pip", "install", *told, "-e", f"{ROOT}[dev]", *stack.requirements], check=True)
+        install = [python, "-m", "pip", "install", *told]
+        subprocess.run([*install, "-e", f"{ROOT}[dev]", *stack.requirements], check=True)
+        subprocess.run([*install, "--no-deps", f"robosuite=={ROBOSUITE}"], check=True)  # the robot's files
         ready.write_text(wanted)
     return python
 

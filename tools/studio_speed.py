@@ -14,7 +14,7 @@ from pathlib import Path
 from browser import ARGUMENTS, PAD, installed
 from playwright.sync_api import Page, sync_playwright
 
-from scengen.cli.commands.teleop import source_of_pool
+from scengen.cli.commands.demos_pad import source_of_pool
 from scengen.demos.teleop.collect import TeleopSettings
 from scengen.ood.analysis.redraw import task_of
 from scengen.pool import Pool

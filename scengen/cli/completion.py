@@ -12,6 +12,7 @@ from .. import compose
 from ..errors import ScengenError
 from ..pool import Pool
 from ..samplers import task_files
+from .verbs import FORMS, parsed
 
 BASH = r"""
 _scengen() {
@@ -39,10 +40,16 @@ def completions(line: str, verbs: Sequence[str]) -> list[str]:
     *before, word = line.split(" ")
     words = [text for text in before[1:] if text]
     if not words:
-        return [verb for verb in verbs if verb.startswith(word)]
-    verb, *others = words
+        return [verb for verb in dict.fromkeys(verb.split(" ")[0] for verb in verbs) if verb.startswith(word)]
+    verb, others = parsed(tuple(words))
+    forms = [form for form in FORMS.get(words[0], ()) if form.startswith(word)] if len(words) == 1 else []
     if verb not in verbs:
-        return []
+        return forms
+    return [*forms, *_values(verb, others, word)]
+
+
+def _values(verb: str, others: Sequence[str], word: str) -> list[str]:
+    """Completions of a setting of a command."""
     key, equals, _ = word.partition("=")
     with suppress(ScengenError):  # the line is not complete yet
         if equals and key == "split":

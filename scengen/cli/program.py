@@ -16,7 +16,7 @@ from types import FrameType
 from typing import NoReturn
 
 from ..errors import BadConfig, ForeignCode, ScengenError, cut, nearest
-from .verbs import CONTINUING, GROUPS, RENAMED, VERBS
+from .verbs import COMMANDS, CONTINUING, FORMS, GROUPS, ONLY_FORMS, RENAMED, VERBS, file_stem, parsed
 
 OK = 0
 """Exit status of a command that succeeded."""
@@ -119,7 +119,7 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
 
 
 def _interrupted(argv: Sequence[str]) -> int:
-    continues = RENAMED.get(argv[0], argv[0]) in CONTINUING
+    continues = parsed(tuple(argv))[0] in CONTINUING
     remedy = "finished work is kept; repeat the command to continue" if continues else "repeat it to start over"
     _print_error(f"scengen: interrupted; {remedy}")
     return INTERRUPTED
@@ -148,20 +148,21 @@ def _status_of(error: Exception) -> int:
 
 def _run(argv: Sequence[str], signals: Signals | None) -> int:
     _warn_of_platform()
+    if argv[:1] == ["help"] and len(argv) > 1:
+        argv = [*argv[1:], "--help"]
     if not argv or argv[0] in ("-h", "--help", "help"):
         print(_help())
         return OK
-    verb, *arguments = argv
-    if verb in RENAMED:
-        _print_error(f"scengen: `{verb}` is now `{RENAMED[verb]}`; the old name goes with 0.3")
-        verb = RENAMED[verb]
+    if argv[0] in RENAMED:
+        _print_error(f"scengen: `{argv[0]}` is now `{RENAMED[argv[0]]}`; the old name goes with 0.4")
+    verb, arguments = parsed(tuple(argv))
     if verb == "--version":
-        from ..versions import versions
+        from ..installation import versions
 
         print(" ".join(f"{k} {v}" for k, v in versions().items()))
         return OK
     if verb not in (*VERBS, *COMPLETING):
-        raise BadConfig(f"no command named {cut(repr(verb))}{nearest(verb, VERBS)}; known: {', '.join(VERBS)}")
+        raise _unknown(verb, arguments)
 
     from ..samplers.task_files import ORIGINS
     from .usage import usage
@@ -186,17 +187,27 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
         out.print("\n".join(completions(" ".join(arguments), VERBS)), soft_wrap=True)
         return OK
     if verb in ("generate", "demos"):  # multiple values are a sweep there, with or without Hydra's option
-        arguments = [a for a in arguments if a not in ("-m", "--multirun")]
+        arguments = tuple(a for a in arguments if a not in ("-m", "--multirun"))
     flags = [a for a in arguments if a.startswith("-")]
     if flags and flags[0].partition("=")[0] in SHOW_OPTIONS:
         return _show(verb, arguments)
     if flags:
         known = "settings are key=value, options --help, --cfg job and --info " + "|".join(ORIGINS)
         raise BadConfig(f"{cut(repr(flags[0]))} is not an option; {known}; see scengen {verb} --help")
-    command = import_module(f"scengen.cli.commands.{verb}").command
+    command = import_module(f"scengen.cli.commands.{file_stem(verb)}").command
     if signals:
         signals.working = True
     return command(arguments)
+
+
+def _unknown(verb: str, arguments: Sequence[str]) -> BadConfig:
+    """Why the beginning of a command line names no command."""
+    if verb in FORMS:
+        forms, given = FORMS[verb], cut(repr(arguments[0])) if arguments else "nothing"
+        return BadConfig(
+            f"{verb} needs one of {', '.join(forms)} after it, and got {given}; see scengen {verb} {forms[0]} --help"
+        )
+    return BadConfig(f"no command named {cut(repr(verb))}{nearest(verb, COMMANDS)}; known: {', '.join(COMMANDS)}")
 
 
 def _warn_of_platform() -> None:
@@ -275,15 +286,22 @@ def _write_traceback(error: BaseException) -> str:
 
 
 def _help() -> str:
-    """The commands by purpose, each with the docstring of its module."""
-    folder = Path(__file__).parent / "commands"
+    """The commands by purpose, each with the docstring of its module and its forms."""
     lines = ["scengen: physical puzzles for robot manipulation, each verified to be solvable", ""]
-    lines += ["usage: scengen COMMAND [key=value ...]      settings of a command: scengen COMMAND --help", ""]
+    lines += ["usage: scengen COMMAND [key=value ...]      settings of a command: scengen help COMMAND", ""]
     for purpose, verbs in GROUPS.items():
         lines.append(f"{purpose}:")
         for verb in verbs:
-            lines.append(f"  {verb:<12}{ast.get_docstring(ast.parse((folder / f'{verb}.py').read_text()))}")
+            if verb not in ONLY_FORMS:
+                lines.append(f"  {verb:<18}{_purpose(verb)}")
+            lines += [f"  {verb} {form:<{17 - len(verb)}}{_purpose(f'{verb} {form}')}" for form in FORMS.get(verb, ())]
         lines.append("")
     lines.append("example: scengen generate task=domino_single split=diagonal n=100 workers=2 pool=generated/diagonal")
     lines.append('completion in bash: eval "$(scengen --completion bash)"')
     return "\n".join(lines)
+
+
+def _purpose(verb: str) -> str:
+    """Docstring of the module of a command."""
+    path = Path(__file__).parent / "commands" / f"{file_stem(verb)}.py"
+    return ast.get_docstring(ast.parse(path.read_text())) or ""

@@ -22,7 +22,7 @@ def usage(verb: str, overrides: Sequence[str]) -> str:
     Raises:
         ScengenError: the chosen task does not exist.
     """
-    text = (task_files.conf_dir() / "command" / f"{verb}.yaml").read_text()
+    text = task_files.command_file(verb).read_text()
     own = "".join(line for line in text.splitlines(keepends=True) if not _for_hydra(line))
     takes_pool = bool(re.search("^(pool|hits|replay):", text, re.M))
     return own + "".join(f"{line}\n" for line in _more(verb, task_files.groups(verb), takes_pool, overrides))

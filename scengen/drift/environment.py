@@ -24,7 +24,8 @@ from filelock import FileLock
 
 from ..control import native
 from ..errors import BadConfig, ScengenError, cut, nearest
-from ..work.targets import cache_folder, refused
+from ..installation import cache_folder
+from ..work.targets import refused
 
 READY = "ready"
 """Name of the file that is written last. An environment without it is unfinished and is made again."""

@@ -159,7 +159,7 @@ def _compared(found: Sequence[Check], stored: Mapping[str, Check]) -> tuple[Repe
 
 
 def answers(request: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """The version and fingerprint of this process, then a judgement of every scenario; see `commands.drift`."""
+    """The version and fingerprint of this process, then a judgement of every scenario; see `commands.verify_mujoco`."""
     yield {"mujoco": mujoco.__version__, "fingerprint": fingerprint()}
     limits = Limits(request["limit_seconds"], request["limit_mb"])
     for folder in request["pools"]:

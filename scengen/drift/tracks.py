@@ -87,7 +87,7 @@ def tracks(folder: str, search: Sequence[str], ids: Sequence[str]) -> Iterator[t
 
 
 def answers(request: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """A line for every track that is requested: `pools` has ids by folder; see `commands.drift`."""
+    """A line for every track that is requested: `pools` has ids by folder; see `commands.verify_mujoco`."""
     for folder, ids in request["pools"].items():
         for name, found in tracks(folder, request["search"], ids):
             yield {"pool": folder, "id": name, "track": found}

@@ -14,36 +14,42 @@ from numpy.typing import NDArray
 
 from ..compat import ROBOSUITE_RUNS
 from ..errors import ScengenError
+from ..installation import ROBOSUITE
 from ..robots import panda, suction
 from ..sim import scene_text
-from ..versions import ROBOSUITE
+
+REMEDY = "run pip install 'scengen[robosuite]', in an environment of its own"
+"""Remedy for whatever keeps robosuite's environments from running."""
 
 
 class NoRobosuite(ScengenError, ImportError):
-    """robosuite's Python code is missing, is another release, or does not run with the installed MuJoCo."""
+    """robosuite's Python code or one of its requirements is missing, is another release, or does not run with the
+    installed MuJoCo."""
 
 
 def _check_installed() -> None:
     """Raise `NoRobosuite` unless robosuite's environments can run here."""
-    remedy = "run pip install 'scengen[robosuite]', in an environment of its own"
     try:
         found = version("robosuite")
     except PackageNotFoundError:
-        raise NoRobosuite(f"no robosuite for its environments; {remedy}") from None
+        raise NoRobosuite(f"no robosuite for its environments; {REMEDY}") from None
     if found != ROBOSUITE:
-        raise NoRobosuite(f"certified scenarios run in robosuite {ROBOSUITE}, this is {found}; {remedy}")
+        raise NoRobosuite(f"certified scenarios run in robosuite {ROBOSUITE}, this is {found}; {REMEDY}")
     if not ROBOSUITE_RUNS:
-        raise NoRobosuite(f"robosuite {found} does not run with mujoco {mujoco.__version__}; {remedy}")
+        raise NoRobosuite(f"robosuite {found} does not run with mujoco {mujoco.__version__}; {REMEDY}")
 
 
 _check_installed()
 _log = logging.getLogger("robosuite_logs")
 _log.disabled = True  # on import, robosuite recommends packages that are not needed here
-from robosuite.models.base import MujocoXML  # noqa: E402
-from robosuite.models.grippers import register_gripper  # noqa: E402
-from robosuite.models.grippers.gripper_model import GripperModel  # noqa: E402
-from robosuite.models.robots import RobotModel  # noqa: E402
-from robosuite.models.tasks import ManipulationTask  # noqa: E402
+try:
+    from robosuite.models.base import MujocoXML
+    from robosuite.models.grippers import register_gripper
+    from robosuite.models.grippers.gripper_model import GripperModel
+    from robosuite.models.robots import RobotModel
+    from robosuite.models.tasks import ManipulationTask
+except ModuleNotFoundError as error:  # installed for the robot's files alone
+    raise NoRobosuite(f"robosuite {ROBOSUITE} is here without its requirement {error.name}; {REMEDY}") from None
 
 _log.disabled = False
 _log.setLevel(logging.WARNING)  # at INFO it logs the path of a controller's file for every environment

@@ -15,6 +15,7 @@ import yaml
 
 from ..compose import certify_levels, load_task
 from ..errors import BadConfig, Infeasible, PoolError, UnknownName, cut
+from ..installation import versions
 from ..pool import Pool
 from ..pool.manifest import MANIFEST
 from ..runs.generate import GenerateSettings, generate
@@ -23,7 +24,6 @@ from ..samplers.task import Task
 from ..samplers.task_files import about, conf_dir, tasks
 from ..sim import scene_text
 from ..validate.rebuilt import portable_sha256, rebuild
-from ..versions import versions
 from ..work.parallel import Workers
 from ..work.targets import write
 from ..work.typed import typed

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..assets.prop import table
 from ..errors import Infeasible, PoolError
+from ..installation import versions
 from ..params import parameters
 from ..samplers.dists import Dist
 from ..samplers.split import ID
@@ -33,13 +34,12 @@ from ..sim import scene_text
 from ..sim.world import World
 from ..validate.identity import source_sha256
 from ..validate.rebuilt import portable_sha256
-from ..versions import versions
 from ..work.fingerprint import fingerprint
 from . import edges, rules
 from .episodes import episodes_sha256
 from .rollouts import Stage
 
-FORMAT = 3
+FORMAT = 5
 """Format of a behaviour file, which includes the rollouts and states of which it consists."""
 SEED = 7
 """Seed of the draws."""
@@ -66,6 +66,8 @@ class Behaviour:
     """Declared values: time limit, instruction, bounds, distributions, hash of the robot."""
     draws: Mapping[str, Mapping[str, Any]]
     """Draws by split and index: id, attempt, portable hashes of scene and ablations, features, facts, orientation."""
+    reasons: Sequence[str]
+    """Reasons of refutations, to which `constraints` refer by number."""
     constraints: Sequence[Any]
     """Limits of the constraints, see `edges.Edge`."""
     answers: Sequence[str]
@@ -263,13 +265,13 @@ def asked(stage: Stage, stored: Behaviour) -> dict[str, Any]:
     book, scenario, world = Book(list(stored.answers)), stage.scenario, stage.world
     contacts = [rules.Contact(*each) for each in stored.contacts]
     along = list(rules.coordinates(world))
-    probes = [rules.Probe(scenario, world, unpacked(each["state"])) for each in stored.states]
-    states = [_answers(probe, k, along, contacts, book, stored.states[k]["state"]) for k, probe in enumerate(probes)]
+    probes = [rules.Probe(scenario, world, unpacked(each["state"]), contacts) for each in stored.states]
+    states = [_answers(probe, k, along, book, stored.states[k]["state"]) for k, probe in enumerate(probes)]
     limits = []
     for state, text, magnitude, *_ in stored.limits:
-        probe, along_one = probes[state], rules.Coordinate.parse(text)
-        sides = [book.numbers(side) for side in probe.around(along_one, magnitude)]
-        limits.append([state, text, magnitude, *sides, probe.numbers_around(along_one, magnitude)])
+        probe, place = probes[state], rules.Place.parse(text)
+        sides = [book.numbers(side) for side in probe.around(place, magnitude)]
+        limits.append([state, text, magnitude, *sides, probe.numbers_around(place, magnitude)])
     return {"answers": book.answers, "states": states, "limits": limits}
 
 
@@ -277,7 +279,6 @@ def _answers(
     probe: rules.Probe,
     number: int,
     along: Sequence[rules.Coordinate],
-    contacts: Sequence[rules.Contact],
     book: Book,
     state: str,
 ) -> dict[str, Any]:
@@ -285,8 +286,9 @@ def _answers(
     return {
         "answers": book.numbers(probe.answers()),
         "numbers": probe.numbers(),
-        "contacts": list(rules.under_contacts(probe, contacts)),
-        "mixed": list(rules.under_mixtures(probe, number, along, contacts)),
+        "contacts": list(rules.under_contacts(probe)),
+        "swept": list(rules.swept(probe, along)),
+        "mixed": list(rules.under_mixtures(probe, number, along)),
         "state": state,
     }
 
@@ -299,15 +301,14 @@ def explored(stage: Stage, states: Sequence[NDArray[np.float64]]) -> dict[str, A
     along, described_states, limits = list(rules.coordinates(world)), [], []
     counts: dict[Any, int] = {}
     for number, text in enumerate(texts):
-        probe = rules.Probe(scenario, world, unpacked(text))
-        described_states.append(_answers(probe, number, along, contacts, book, text))
-        for limit in rules.limits(probe, number, along):
-            kind = (limit.before, limit.after, limit.coordinate.kind, limit.coordinate.of, limit.coordinate.axis)
-            counts[kind] = counts.get(kind, 0) + 1
-            if counts[kind] <= rules.MAX_LIMITS:
+        probe = rules.Probe(scenario, world, unpacked(text), contacts)
+        described_states.append(_answers(probe, number, along, book, text))
+        for limit in rules.limits(probe, along):
+            counts[limit.kind] = counts.get(limit.kind, 0) + 1
+            if counts[limit.kind] <= (rules.MAX_LIMITS if limit.place.contacts == "same" else 1):
                 numbers = book.numbers(limit.before), book.numbers(limit.after)
-                around = probe.numbers_around(limit.coordinate, limit.magnitude)
-                limits.append([number, str(limit.coordinate), limit.magnitude, *numbers, around])
+                around = probe.numbers_around(limit.place, limit.magnitude)
+                limits.append([number, str(limit.place), limit.magnitude, *numbers, around])
     plain = [[contact.table, contact.a, contact.b] for contact in contacts]
     return {"answers": book.answers, "contacts": plain, "states": described_states, "limits": limits}
 
@@ -349,25 +350,30 @@ def observe(task: Task, cheats: Mapping[str, Cheat], steady: bool = True) -> Beh
         cheats: kept cheats of the task by name.
         steady: see `rollouts`.
     """
-    states: dict[str, NDArray[np.float64]] = {}
     stage = Stage(task.draw(ID, SEED, 0).scenario, task.embodiment, task.horizon, cheats)
+    start = stage.world.state()
+    first: dict[str, NDArray[np.float64]] = {}
+    last: dict[str, NDArray[np.float64]] = {}
 
-    def keep(world: World, answer: str) -> None:
-        if answer not in states and world is stage.world:  # other scenes have other states
-            states[answer] = world.state()
+    def keep(world: World, answer: str, state: NDArray[np.float64], before: str) -> None:
+        if world is stage.world:  # other scenes have other states
+            first.setdefault(answer, world.state())
+            last.setdefault(before, state)
 
     stage.on_change = keep
     played = rollouts(stage, lambda name: True, steady)
     stage.on_change = None
-    found = explored(stage, rules.chosen(states))
+    found = explored(stage, rules.chosen(start, last, first))
     starts = [task.draw(ID, SEED, index).scenario for index in range(TRAINING_DRAWS)]
+    reasons: list[str] = []
     return Behaviour(
         task.name,
         task.version,
         made(task),
         declared(task),
         {f"{split} {index}": drawn(task, split, index) for split, index in splits(task)},
-        [edge.plain for edge in edges.edges(task, starts, SEED)],
+        constraints=[edge.plain(reasons) for edge in edges.edges(task, starts, SEED)],
+        reasons=reasons,
         rollouts={f"{ID} 0 {name}": result for name, result in played.items()} | oracles(task),
         **found,
     )

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from ..errors import Infeasible
+from ..installation import versions
 from ..samplers.split import ID
 from ..samplers.task import Task
-from ..versions import versions
 from ..work.fingerprint import fingerprint
 from .behaviour import (
     SEED,
@@ -154,9 +154,9 @@ def _described(task: Task, stored: Behaviour) -> Iterator[Difference]:
         starts = [task.draw(ID, SEED, index).scenario for index in range(TRAINING_DRAWS)]
     except Infeasible:
         return  # the draws differ, which is said above
-    for edge in map(Edge.of, stored.constraints):
+    for edge in (Edge.of(plain, stored.reasons) for plain in stored.constraints):
         if (again := edge.again(starts[edge.start])) != edge:
-            was, now = (f"{e.before or 'feasible'} / {e.after or 'feasible'}" for e in (edge, again))
+            was, now = (" / ".join("; ".join(s) or "feasible" for s in (e.before, e.after)) for e in (edge, again))
             yield Difference(task.name, "constraint", ", ".join(edge.pairs), was, now, "version")
 
 
@@ -178,7 +178,7 @@ def _rules(task: str, stored: Behaviour, now: Mapping[str, Any]) -> Iterator[Dif
         for part, kind in enumerate(RULES):
             if was["answers"][part] != here["answers"][part]:
                 yield Difference(task, kind, f"state {number}", told[0][part], told[1][part], "version")
-            for how in ("contacts", "mixed"):
+            for how in ("contacts", "swept", "mixed"):
                 if was[how][part] != here[how][part]:
                     yield Difference(task, kind, f"state {number}, {how}", was[how][part], here[how][part], "version")
         if was["numbers"] != here["numbers"]:
@@ -225,5 +225,7 @@ def merged(stored: Behaviour, observed: Behaviour) -> Behaviour:
     played = {
         name: [*result[:3], "unsteady"] if name in marks else list(result) for name, result in observed.rollouts.items()
     }
-    kept = {name: getattr(stored, name) for name in ("constraints", "answers", "contacts", "states", "limits")}
+    kept = {
+        name: getattr(stored, name) for name in ("reasons", "constraints", "answers", "contacts", "states", "limits")
+    }
     return replace(observed, rollouts=played, **kept)

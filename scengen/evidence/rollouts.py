@@ -63,6 +63,10 @@ class Played:
         return [self.verdict, self.seconds, self.bits, *([] if self.steady else ["unsteady"])]
 
 
+OnChange = Callable[[World, str, NDArray[np.float64], str], None]
+"""Function that is told when the rules change their answer."""
+
+
 @dataclass
 class Trace:
     """What the rules of a scenario say in each control period of a rollout."""
@@ -70,15 +74,19 @@ class Trace:
     scenario: Scenario
     changes: list[tuple[float, str]] = field(default_factory=list)
     """Times at which the rules changed their answer [s], and the new answer."""
-    on_change: Callable[[World, str], None] | None = None
-    """Called with the world and the new answer."""
+    on_change: OnChange | None = None
+    """Called with the world and the new answer, and with the state and the answer of the period before."""
+    before: NDArray[np.float64] | None = None
+    """State after the last period, if changes are asked for."""
 
     def __call__(self, world: World) -> None:
         answer = answer_of(self.scenario, world)
         if not self.changes or self.changes[-1][1] != answer:
+            if self.on_change is not None and self.before is not None:
+                self.on_change(world, answer, self.before, self.changes[-1][1])
             self.changes.append((round(world.time, 6), answer))
-            if self.on_change is not None:
-                self.on_change(world, answer)
+        if self.on_change is not None:
+            self.before = world.state()
 
 
 def answer_of(scenario: Scenario, world: World) -> str:
@@ -110,7 +118,7 @@ class Stage:
     """Time limit [s]."""
     cheats: Mapping[str, tuple[Callable[[Scenario, World], Plan], bool]] = field(default_factory=dict)
     """Plans that once reached the goal without the intended means, and whether they act without the filter, by name."""
-    on_change: Callable[[World, str], None] | None = None
+    on_change: OnChange | None = None
     """See `Trace.on_change`."""
 
     def __post_init__(self) -> None:
@@ -141,6 +149,8 @@ class Stage:
                 yield told, lambda world, s=shortcut, raw=raw: try_shortcut(scenario, world, s, horizon, raw=raw)
         for number in range(JITTERED):
             yield f"jitter {number}", lambda world, number=number: self._jittered(world, number)
+        if scenario.steps():
+            yield "steps", lambda world: run(scenario, world, self._steps, horizon)
         for name, (plan, raw) in self.cheats.items():
             yield f"cheat {name}", lambda world, p=plan, raw=raw: self._attempt(world, lambda w: p(scenario, w), raw)
 
@@ -180,6 +190,11 @@ class Stage:
             if verdict_of(how(nudge.disturbed(world, self.scenario.DISTURBED))) != verdict:
                 return False
         return True
+
+    def _steps(self, world: World) -> Plan:
+        """The moves of the sub-goals one after the other, as the family lists them."""
+        for move in self.scenario.steps().values():
+            yield from move(world)
 
     def _attempt(self, world: World, planner: Planner, raw: bool) -> Rollout:
         return run(self.scenario, world, planner, self.horizon, raw=raw)

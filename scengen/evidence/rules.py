@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
-from typing import Self
+from typing import Any, Literal, Self, cast, get_args
 
 import mujoco
 import numpy as np
@@ -33,6 +33,8 @@ MAX_LIMITS = 2
 """Largest number of limits that are stored for the same change of answer along the same coordinate."""
 MAX_TOGGLES = 16
 """Largest number of contacts that are added or removed, singly and in pairs."""
+SWEPT = {"place": (0.02, 0.1, 0.5), "all": (0.02, 0.1, 0.5), "memory": (1.0, 100.0), "time": (1.0, 100.0)}
+"""Sizes of changes with all or none of the contacts, by kind of coordinate: a limit may appear that was not there."""
 MIXED = 120
 """Number of states with several random changes at once, for each stored state."""
 BISECTIONS = 34
@@ -47,6 +49,8 @@ MAGNITUDES = {
     "joint": np.geomspace(1e-3, 3.1, 10),  # [rad, m]
     "rate": np.geomspace(1e-3, 3.0, 10),  # [rad/s, m/s]
     "arm": np.geomspace(1e-3, 2.0, 8),  # [rad, m]
+    "all": np.geomspace(1e-4, 1.0, 15),  # [m]
+    "roll": np.geomspace(1e-3, 3.1, 12),  # [rad]
     "memory": np.geomspace(1e-3, 100.0, 13),
     "time": np.geomspace(5e-3, 100.0, 13),  # [s]
 }
@@ -66,26 +70,54 @@ class Coordinate:
     sign: int
     """Direction of the change, 1 or -1."""
 
+    @property
+    def line(self) -> tuple[str, str, int]:
+        """The coordinate whatever its direction."""
+        return self.kind, self.of, self.axis
+
+
+Contacts = Literal["same", "none", "all"]
+"""Which of the contacts that the rules ask for there are: those of the state, none, or all."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a limit is looked for: along a coordinate, and with which contacts."""
+
+    coordinate: Coordinate
+    contacts: Contacts = "same"
+
     def __str__(self) -> str:
-        return f"{self.kind} {self.of} {self.axis} {self.sign:+d}"
+        c = self.coordinate
+        return f"{c.kind} {c.of} {c.axis} {c.sign:+d} {self.contacts}"
 
     @classmethod
     def parse(cls, text: str) -> Self:
         """The reverse of `str`."""
-        kind, of, axis, sign = text.split(" ")
-        return cls(kind, of, int(axis), int(sign))
+        kind, of, axis, sign, contacts = text.split(" ")
+        return cls(Coordinate(kind, of, int(axis), int(sign)), cast(Contacts, contacts))
 
 
 class Probe:
     """A world in a stored state, in which the rules are asked about changes of it."""
 
-    def __init__(self, scenario: Scenario, world: World, state: NDArray[np.float64]):
-        self.scenario, self.world = scenario, world
+    def __init__(
+        self, scenario: Scenario, world: World, state: NDArray[np.float64], contacts: Sequence["Contact"] = ()
+    ):
+        """
+        Args:
+            state: the state, see `World.state`.
+            contacts: contacts for which the rules ask.
+        """
+        self.scenario, self.world, self.contacts = scenario, world, contacts
         world.restore(state)  # later probes of the same world may change it: `answers` sets all that rules read
         data, loop = world.data, world.loop
         self._start = {name: getattr(data, name).copy() for name in FIELDS}
         self._time, self._tables = data.time, (loop.touching.copy(), loop.touched.copy())
         self._jams = [loop.jammed(arm.number) for arm in _all_arms(world)]
+        there = {contact: bool(contact.entry(world)) for contact in contacts}
+        none, missing = ([c for c in contacts if there[c] == flag] for flag in (True, False))
+        self._turned: dict[Contacts, list[Contact]] = {"same": [], "none": none, "all": missing}
 
     def answers(
         self, changes: Mapping[Coordinate, float] | None = None, contacts: Sequence["Contact"] = ()
@@ -112,9 +144,13 @@ class Probe:
         mujoco.mj_comVel(world.model, data)
         return _answered(lambda: answer_of(self.scenario, world)), _answered(self._happened)
 
-    def around(self, coordinate: Coordinate, magnitude: float) -> list[tuple[str, str]]:
+    def at(self, place: Place, magnitude: float) -> tuple[str, str]:
+        """What the rules say after a change at a place."""
+        return self.answers({place.coordinate: magnitude}, self._turned[place.contacts])
+
+    def around(self, place: Place, magnitude: float) -> list[tuple[str, str]]:
         """What the rules say just below a magnitude of a change, and just above it."""
-        return [self.answers({coordinate: magnitude * (1.0 + side)}) for side in (-MARGIN, MARGIN)]
+        return [self.at(place, magnitude * (1.0 + side)) for side in (-MARGIN, MARGIN)]
 
     def _happened(self) -> str:
         """What the events do in the state: whole numbers of the memory, and kinds of other effects."""
@@ -130,16 +166,20 @@ class Probe:
         done += [f"told {np.sign(arm.told).astype(int).tolist()}" for arm in world.partners]
         return ", ".join(done)
 
-    def numbers(self, *changes: Mapping[Coordinate, float]) -> str:
-        """Hash of the numbers that events write after each of some changes of the state, to six digits."""
-        return _hash("\n".join(map(self._numbers, changes or [{}])))
+    def numbers(self) -> str:
+        """Hash of the numbers that events write in the state, to six digits."""
+        self.answers()
+        return _hash(self._written())
 
-    def numbers_around(self, coordinate: Coordinate, magnitude: float) -> str:
-        """Those just below a magnitude of a change, and just above it."""
-        return self.numbers(*({coordinate: magnitude * (1.0 + side)} for side in (-MARGIN, MARGIN)))
+    def numbers_around(self, place: Place, magnitude: float) -> str:
+        """Hash of those just below a magnitude of a change, and just above it."""
+        found = []
+        for side in (-MARGIN, MARGIN):
+            self.at(place, magnitude * (1.0 + side))
+            found.append(self._written())
+        return _hash("\n".join(found))
 
-    def _numbers(self, changes: Mapping[Coordinate, float]) -> str:
-        self.answers(changes)
+    def _written(self) -> str:
         parts = [getattr(self.world.data, name).ravel() for name in ("userdata", *EFFECTS)]
         parts += [np.asarray(arm.told) for arm in self.world.partners]
         return " ".join(f"{value:.6g}" if abs(value) > 1e-9 else "0" for part in parts for value in part)
@@ -160,6 +200,10 @@ class Contact:
     a: str
     """Name of a body, or of an arm."""
     b: str
+
+    def entry(self, world: World) -> int:
+        """The answer, 0 or 1."""
+        return int(getattr(world.loop, self.table)[world.row(self.a), world.row(self.b)])
 
     def turn_around(self, world: World) -> None:
         """Answer the question in the opposite way from now on."""
@@ -189,6 +233,7 @@ def coordinates(world: World) -> Iterator[Coordinate]:
         *((kind, body, axis) for body in _spread(world.free_bodies) for kind in _FREE for axis in range(3)),
         *((kind, joint, 0) for joint in _spread(hung) for kind in ("joint", "rate")),
         *(("mark", mark, axis) for mark in _spread(marks) for axis in range(2)),
+        *((kind, "", axis) for kind in ("all", "roll") for axis in range(3) if len(world.free_bodies) > 1),
         *(("arm", arm.label, joint) for arm in _all_arms(world) for joint in range(8)),
         *(("memory", name, 0) for name in world.memory.names),
         ("time", "", 0),
@@ -214,7 +259,9 @@ def _change(world: World, coordinate: Coordinate, by: float) -> None:
         case "time":
             data.time = max(0.0, data.time + by)
         case "memory":
-            data.userdata[world.memory.names.index(coordinate.of)] += by
+            number = world.memory.names.index(coordinate.of)
+            least = min(0.0, data.userdata[number])  # flags and counts are never negative
+            data.userdata[number] = max(least, data.userdata[number] + by)
         case "mark":
             data.mocap_pos[model.body_mocapid[world.body(coordinate.of)], axis] += by
         case "joint":
@@ -223,6 +270,8 @@ def _change(world: World, coordinate: Coordinate, by: float) -> None:
             data.qvel[model.joint(coordinate.of).dofadr[0]] += by
         case "arm":
             _bend(world, coordinate, by)
+        case "all" | "roll":
+            _carry(world, coordinate, by)
         case kind:
             _move(model, data, int(model.body_jntadr[world.body(coordinate.of)]), kind, axis, by)
 
@@ -236,6 +285,24 @@ def _bend(world: World, coordinate: Coordinate, by: float) -> None:
     else:
         places = fingers(model, names)
         data.qpos[places] += by * np.array([1.0, -1.0])[: len(places)]
+
+
+def _carry(world: World, coordinate: Coordinate, by: float) -> None:
+    """Move all free bodies, or turn them about the first one, as if they were one body."""
+    model, data, axis = world.model, world.data, coordinate.axis
+    joints = [int(model.body_jntadr[world.body(name)]) for name in world.free_bodies]
+    places = [model.jnt_qposadr[joint] for joint in joints]
+    if coordinate.kind == "all":
+        for joint in joints:
+            _move(model, data, joint, "place", axis, by)
+        return
+    turn, centre = np.zeros(4), data.qpos[places[0] : places[0] + 3].copy()
+    mujoco.mju_axisAngle2Quat(turn, np.eye(3)[axis], by)
+    for joint, place in zip(joints, places, strict=True):
+        away = np.zeros(3)
+        mujoco.mju_rotVecQuat(away, data.qpos[place : place + 3] - centre, turn)
+        data.qpos[place : place + 3] = centre + away
+        _move(model, data, joint, "turn", axis, by)
 
 
 def _move(model: mujoco.MjModel, data: mujoco.MjData, joint: int, kind: str, axis: int, by: float) -> None:
@@ -259,45 +326,62 @@ def _move(model: mujoco.MjModel, data: mujoco.MjData, joint: int, kind: str, axi
 class Limit:
     """A magnitude at which an answer of the rules changes."""
 
-    state: int
-    """Number of the stored state."""
-    coordinate: Coordinate
+    place: Place
     magnitude: float
     before: tuple[str, str]
     """Answers just below the magnitude."""
     after: tuple[str, str]
     """Answers just above it."""
 
+    @property
+    def kind(self) -> tuple[Any, ...]:
+        """What changes at the limit, and along which line; with other contacts than those of the state, whatever the
+        body is."""
+        place, line = self.place, self.place.coordinate.line
+        sides = ({part for answer in side for part in answer.split(", ")} for side in (self.before, self.after))
+        return frozenset(set.symmetric_difference(*sides)), *(line if place.contacts == "same" else (line[0],))
 
-def limits(probe: Probe, state: int, along: Sequence[Coordinate]) -> Iterator[Limit]:
+
+def limits(probe: Probe, along: Sequence[Coordinate]) -> Iterator[Limit]:
     """Limits of the rules around a state."""
-    for coordinate in along:
-        sizes = [0.0, *MAGNITUDES[coordinate.kind]]
-        found = [probe.answers({coordinate: size}) for size in sizes]
+    places = [Place(coordinate, contacts) for contacts in get_args(Contacts) for coordinate in along]
+    for place in places if probe.contacts else places[: len(along)]:
+        sizes = [0.0, *MAGNITUDES[place.coordinate.kind]]
+        found = [probe.at(place, size) for size in sizes]
         for (low, before), (high, after) in pairwise(zip(sizes, found, strict=True)):
             if before != after:
-                at = _bisected(probe, coordinate, low, high)
-                sides = probe.around(coordinate, at)
-                if at and sides[0] != sides[1]:
-                    yield Limit(state, coordinate, at, sides[0], sides[1])
+                magnitude = _bisected(probe, place, low, high)
+                sides = probe.around(place, magnitude)
+                if magnitude and sides[0] != sides[1]:
+                    yield Limit(place, magnitude, sides[0], sides[1])
 
 
-def _bisected(probe: Probe, coordinate: Coordinate, low: float, high: float) -> float:
+def _bisected(probe: Probe, place: Place, low: float, high: float) -> float:
     """A magnitude between two at which an answer changes, to nine digits."""
-    before = probe.answers({coordinate: low})
+    before = probe.at(place, low)
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        low, high = (middle, high) if probe.answers({coordinate: middle}) == before else (low, middle)
+        low, high = (middle, high) if probe.at(place, middle) == before else (low, middle)
     return float(f"{high:.9g}")
 
 
-def chosen(states: Mapping[str, NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """States of a rollout that are stored, of those at which an answer was new: each verdict first, then others."""
-    first: dict[str, str] = {}
-    for answer in states:
-        first.setdefault(answer.partition(", ")[0], answer)
-    order = [*first.values(), *(answer for answer in states if answer not in first.values())]
-    return [states[answer] for answer in order[:MAX_STATES]]
+State = NDArray[np.float64]
+
+
+def chosen(start: State, last: Mapping[str, State], first: Mapping[str, State]) -> list[State]:
+    """States of rollouts that are stored.
+
+    Args:
+        start: state after a reset.
+        last: states just before an answer changed for the first time, by that answer. Each verdict comes first.
+        first: states in which an answer was new, by that answer. They fill what is left.
+    """
+    known, verdicts = {**last, **first, **last}, dict[str, str]()
+    for answer in known:
+        verdicts.setdefault(answer.partition(", ")[0], answer)
+    order = [*verdicts.values(), *(answer for answer in known if answer not in verdicts.values())]
+    others = [state for answer, state in first.items() if answer in last]
+    return [start, *(known[answer] for answer in order), *others][:MAX_STATES]
 
 
 def contacts_asked(scenario: Scenario, world: World, states: Sequence[NDArray[np.float64]]) -> list[Contact]:
@@ -320,15 +404,19 @@ def _about(question: Question) -> Iterator[Contact]:
         yield Contact(question.kind, *sorted(question.names))
 
 
-def under_contacts(probe: Probe, contacts: Sequence[Contact]) -> tuple[str, str]:
+def under_contacts(probe: Probe) -> tuple[str, str]:
     """Hashes of the answers with contacts turned around, singly and in pairs."""
-    sets = [(contact,) for contact in contacts] + list(combinations(contacts, 2))
+    sets = [(contact,) for contact in probe.contacts] + list(combinations(probe.contacts, 2))
     return _hashes([probe.answers(contacts=turned) for turned in sets])
 
 
-def under_mixtures(
-    probe: Probe, state: int, along: Sequence[Coordinate], contacts: Sequence[Contact]
-) -> tuple[str, str]:
+def swept(probe: Probe, along: Sequence[Coordinate]) -> tuple[str, str]:
+    """Hashes of the answers with all or none of the contacts under changes of `SWEPT`."""
+    places = [Place(c, contacts) for contacts in ("none", "all") for c in along if c.kind in SWEPT]
+    return _hashes([probe.at(place, size) for place in places for size in SWEPT[place.coordinate.kind]])
+
+
+def under_mixtures(probe: Probe, state: int, along: Sequence[Coordinate]) -> tuple[str, str]:
     """Hashes of the answers under several random changes at once."""
     found = []
     for number in range(MIXED):
@@ -337,7 +425,7 @@ def under_mixtures(
             coordinate = along[int(unit("mixed", state, number, k) * len(along))]
             low, high = MAGNITUDES[coordinate.kind][[0, -1]]
             chosen[coordinate] = low * (high / low) ** unit("mixed", state, number, k, "size")
-        turned = [c for k, c in enumerate(contacts) if unit("mixed", state, number, "contact", k) < 0.15]
+        turned = [c for k, c in enumerate(probe.contacts) if unit("mixed", state, number, "contact", k) < 0.15]
         found.append(probe.answers(chosen, turned))
     return _hashes(found)
 

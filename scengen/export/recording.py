@@ -24,6 +24,7 @@ from ..envs.object_state import bodies_of
 from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named, proprioception
 from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName
+from ..installation import versions
 from ..orientation import Orientation
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
@@ -33,7 +34,6 @@ from ..pool.demonstrations import demonstration_folders, is_demonstrations
 from ..pool.row import DemonstrationRow
 from ..sim.world import World
 from ..validate.playable import stored_world, unplayable
-from ..versions import versions
 from ..work.limits import at_least
 from ..work.parallel import Workers
 from ..work.targets import appearing, check_unfinished, try_file, try_folder

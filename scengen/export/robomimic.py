@@ -29,11 +29,11 @@ from ..envs.observations import Stream, cameras_of
 from ..envs.robomimic import OBJECT
 from ..envs.robosuite import ROBOT, RobosuiteEnv, env_class
 from ..errors import BadConfig
+from ..installation import versions
 from ..pool.row import DemonstrationRow
 from ..robots.panda import Names
 from ..sim.embodiment import hands
 from ..sim.world import World
-from ..versions import versions
 from .hdf5 import Output
 from .replay import Snapshot, WitnessReplay
 

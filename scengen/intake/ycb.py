@@ -15,9 +15,10 @@ from ..assets.prop import Prop
 from ..assets.ycb import Ycb, by_name, mesh_of
 from ..errors import BadConfig
 from ..geometry import UP, Mat3, about_z, shortest
+from ..installation import cache_folder
 from ..samplers.split import Split
 from ..samplers.task import Task, load, things
-from ..work.targets import cache_folder, try_folder, write
+from ..work.targets import try_folder, write
 from .asset import IntakeRequest, MeshAsset, key, make_asset
 from .feet import side_below
 from .solid import content

@@ -12,9 +12,9 @@ from filelock import FileLock, Timeout
 from matplotlib.figure import Figure
 
 from ..errors import BadConfig, UnknownName, cut
+from ..installation import versions
 from ..pictures.plots import svg_bytes
 from ..pool.files import sha256
-from ..versions import versions
 from ..work.limits import at_least
 from ..work.targets import refused, try_folder, write
 from .data import MIN_EPISODES, TrainingData

@@ -25,7 +25,7 @@ NOT_SEARCHED = "boundaries were not searched for (rounds=0)"
 
 @dataclass(frozen=True)
 class AxisSettings:
-    """Settings of `scengen probe`; conf/command/probe.yaml explains them."""
+    """Settings of `scengen axis card`; conf/command/axis_card.yaml explains them."""
 
     axis: str = ""
     n: int = 50
@@ -116,6 +116,6 @@ def read_card(path: Path) -> dict[str, Any]:
     except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
         raise BadConfig(f"{path} is not the card of an axis: {type(error).__name__} {cut(str(error))}") from None
     if made != FORMAT:
-        remedy = f"scengen probe task={task} axis={axis} writes it again, and plays only what is missing"
+        remedy = f"scengen axis card task={task} axis={axis} writes it again, and plays only what is missing"
         raise BadConfig(f"{path} is a card of format {cut(str(made))}; this version reads format {FORMAT}; {remedy}")
     return card

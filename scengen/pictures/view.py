@@ -25,7 +25,7 @@ class NoDisplay(ScengenError):
 def check_display() -> None:
     """Raise `NoDisplay` if no window can be opened: the attempt would end the process."""
     if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
-        raise NoDisplay("no display to open a window on; use scengen film, which draws the same into a file")
+        raise NoDisplay("no display to open a window on; use scengen show film, which draws the same into a file")
 
 
 def view(row: PoolRow, scenario: Scenario, replay: bool) -> None:

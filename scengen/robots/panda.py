@@ -1,24 +1,21 @@
-"""robosuite's Panda on its mount, composed with MjSpec from robosuite's own files, which this package holds.
+"""robosuite's Panda on its mount, composed with MjSpec from robosuite's own files (`files`).
 
-robosuite itself is not needed. Names, masses, poses and everything that robosuite sets in Python instead of XML are the
-same as in its compiled environments. A test compares them all, and the files with those of an installed robosuite.
+robosuite is not imported. Names, masses, poses and everything that robosuite sets in Python instead of XML are the same
+as in its compiled environments. A test compares them all.
 """
 
 import functools
 import math
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..compat import set_damping
+from . import files
 from .jaw import OVERLAP
-
-ASSETS = Path(__file__).parent / "robosuite_assets"
-"""Folder of robosuite's MJCF files and meshes: those of the Panda, its jaw and its mount, under their paths in
-robosuite/models/assets of release `versions.ROBOSUITE`, unchanged."""
 
 JOINTS = 7
 """Number of joints of the arm."""
@@ -250,11 +247,17 @@ def _jaw(visual: bool) -> mujoco.MjSpec:
 
 
 def _load(path: str, visual: bool) -> mujoco.MjSpec:
-    """Parse one of robosuite's asset files, in radians, because robosuite includes all of them in radians."""
-    spec = mujoco.MjSpec.from_file(str(ASSETS / path))
+    """Parse one of robosuite's asset files, in radians, because robosuite includes all of them in radians.
+
+    Raises:
+        NoRobot: it, or one of the meshes that are used, is missing or another one.
+    """
+    spec = mujoco.MjSpec.from_file(str(files.checked(path)))
     spec.compiler.degree = False
     if not visual:
         strip_visual(spec)
+    for mesh in spec.meshes:
+        files.checked(f"{PurePosixPath(path).parent}/{mesh.file}")
     return spec
 
 
@@ -263,7 +266,7 @@ FOLDERS = {
     for names in map(Names, range(MAX_ARMS))
     for prefix, folder in ((names.hand, "grippers"), (names.mount, "bases"), (names.arm, "robots/panda"))
 }
-"""Folder of the meshes of each part inside `ASSETS`, by the prefix of their names."""
+"""Folder of the meshes of each part among `files`, by the prefix of their names."""
 
 
 def mesh_file(name: str, file: str) -> Path:
@@ -272,9 +275,12 @@ def mesh_file(name: str, file: str) -> Path:
     Args:
         name: name of the mesh.
         file: the file that its MJCF names.
+
+    Raises:
+        NoRobot: it is missing or another one.
     """
     folder = next(folder for prefix, folder in FOLDERS.items() if name.startswith(prefix))
-    return ASSETS / folder / file
+    return files.checked(f"{folder}/{file}")
 
 
 def strip_visual(spec: mujoco.MjSpec) -> None:

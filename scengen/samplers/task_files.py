@@ -75,9 +75,14 @@ def _offered(point: EntryPoint) -> str:
     )
 
 
+def command_file(verb: str) -> Path:
+    """The file with the settings of a command."""
+    return conf_dir() / "command" / f"{verb.replace(' ', '_')}.yaml"
+
+
 def groups(verb: str) -> list[str]:
     """Groups from which a command line may choose a file, such as `task`."""
-    return re.findall(r"^ +- /(\w+):", (conf_dir() / "command" / f"{verb}.yaml").read_text(), re.M)
+    return re.findall(r"^ +- /(\w+):", command_file(verb).read_text(), re.M)
 
 
 def search_path(overrides: Sequence[str]) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ CATEGORIES = {
 REPORTS = "generated/*.html"
 """Reports that `scengen report` and `stats` have written, in the folder of the documentation."""
 CARDS = "generated/axes"
-"""Folder of the cards that `scengen probe` has written, likewise."""
+"""Folder of the cards that `scengen axis card` has written, likewise."""
 Progress = Callable[[int, int, str], None]
 """Function that gets the number of finished tasks, the number of all, and what is being made."""
 

@@ -52,7 +52,7 @@ class Recorded:
 def player() -> str:
     """The page that plays all films."""
     page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text()
-    head, end, rest = page.replace("<title>Viser</title>", "<title>scengen film</title>").partition("</head>")
+    head, end, rest = page.replace("<title>Viser</title>", "<title>scengen show film</title>").partition("</head>")
     return f"{head}{SCRIPT}{end}{rest}"
 
 

@@ -13,8 +13,8 @@ from functools import cache
 from pathlib import Path
 
 from ..errors import PoolError
+from ..installation import versions
 from ..scenario import Scenario
-from ..versions import versions
 
 
 def check_versions(made: Mapping[str, str], where: str) -> None:

@@ -2,10 +2,10 @@
 
 from typing import Any
 
+from ..installation import versions
 from ..params import values
 from ..samplers.split import Split
 from ..samplers.task import Draw, Task
-from ..versions import versions
 from ..work.fingerprint import fingerprint
 from .identity import source_sha256
 

@@ -19,10 +19,11 @@ from types import ModuleType
 from typing import TextIO, TypeVar
 
 from ..errors import BadConfig, cut
+from ..installation import cache_folder
 from .crew import Crew
 from .nodes import ClusterError, code_sha256, one_line
 from .parallel import Limits
-from .targets import cache_folder, refused
+from .targets import refused
 
 log = logging.getLogger("scengen.cluster")
 

@@ -11,8 +11,8 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import ScengenError, cut
+from ..installation import versions
 from ..samplers.task_files import conf_dir
-from ..versions import versions
 from .fingerprint import fingerprint
 from .printed import printable
 

@@ -48,11 +48,6 @@ def refused(path: Path | str, error: OSError) -> BadConfig:
     return BadConfig(f"{cut(str(path))} cannot be written: {why}")
 
 
-def cache_folder() -> Path:
-    """The folder `scengen` in the user's folder of cached files, as the XDG specification says."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "scengen")
-
-
 def try_file(path: Path | str | None) -> None:
     """Test whether a file can be written, before the work on its content. Nothing is left behind.
 

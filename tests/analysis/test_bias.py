@@ -116,12 +116,15 @@ def test_a_manifest_that_counts_more_indices_than_it_tells_of_draws_does_not_kee
 
 
 def test_the_command_tells_about_a_pool_and_refuses_a_chosen_one(made, tmp_path, capsys):
-    assert cli.run(("audit", f"pool={made}", f"json={tmp_path / 'b.json'}")) == 0
+    assert cli.run(("report", "audit", f"pool={made}", f"json={tmp_path / 'b.json'}")) == 0
     assert json.loads((tmp_path / "b.json").read_text())["certified"]["accepted"] == 2
     assert cli.run(("subset", f"pool={made}", "n=1", f"to={tmp_path / 'one'}")) == 0
     assert len(Pool.open(tmp_path / "one").check()) == 1
     capsys.readouterr()
-    assert cli.run(("audit", f"pool={tmp_path / 'one'}")) == 2 and "chosen and not drawn" in capsys.readouterr().err
+    assert (
+        cli.run(("report", "audit", f"pool={tmp_path / 'one'}")) == 2
+        and "chosen and not drawn" in capsys.readouterr().err
+    )
     assert cli.run(("subset", f"pool={made}", "n=3", f"to={tmp_path / 'two'}")) == 2
     assert cli.run(("subset", f"pool={made}", "n=1", f"to={tmp_path / 'one'}")) == 2
 
@@ -137,8 +140,8 @@ def test_a_scenario_that_stands_twice_is_not_chosen_twice(made, tmp_path, capsys
 
 
 def test_leaked_scenarios_make_the_comparison_fail(made, tmp_path, capsys):
-    assert cli.run(("compare", f"pool={made}", f"json={tmp_path / 'c.json'}")) == 0
-    assert cli.run(("compare", f"pool={made},{made}", "permutations=9")) == 1
+    assert cli.run(("report", "compare", f"pool={made}", f"json={tmp_path / 'c.json'}")) == 0
+    assert cli.run(("report", "compare", f"pool={made},{made}", "permutations=9")) == 1
     assert "near duplicates" in capsys.readouterr().out
 
 

@@ -74,7 +74,7 @@ def test_the_centre_is_the_median():
 def test_the_command_explains_an_infeasible_scenario(tmp_path, capsys):
     told = tmp_path / "shrunk.json"
     far = "+task.axes.far={replace: {gap_ratio: [uniform, 2.1, 2.4]}}"
-    assert cli.run(("shrink", "task=domino_single", far, "split=far", "index=2", f"json={told}")) == 0
+    assert cli.run(("axis", "shrink", "task=domino_single", far, "split=far", "index=2", f"json={told}")) == 0
     result = json.loads(told.read_text())
     assert result["check"] == "feasible" and [c["parameter"] for c in result["causes"]] == ["gap_ratio"]
     value = result["values"]["gap_ratio"]
@@ -86,18 +86,18 @@ def test_the_command_finds_two_parameters_that_only_together_make_a_scene_overla
     """A slab turned by 90 deg reaches 22 mm farther towards the last tile: too far only where the gap is smaller."""
     told = tmp_path / "shrunk.json"
     crowded = "+task.axes.crowded={replace: {gap_ratio: [uniform, 0.3, 0.4], slab_yaw: 90.0, starter: {mass: 0.1}}}"
-    assert cli.run(("shrink", "task=domino_single", crowded, "split=crowded", f"json={told}")) == 0
+    assert cli.run(("axis", "shrink", "task=domino_single", crowded, "split=crowded", f"json={told}")) == 0
     result = json.loads(told.read_text())
     assert result["check"] == "overlap" and {c["parameter"] for c in result["causes"]} == {"gap_ratio", "slab_yaw"}
 
 
 def test_a_sampler_that_does_not_exist_is_refused(capsys):
-    assert cli.run(("shrink", "task=domino_single", "sampler=nonsense")) == 2
+    assert cli.run(("axis", "shrink", "task=domino_single", "sampler=nonsense")) == 2
     assert "known: iid" in capsys.readouterr().err
 
 
 def test_a_scenario_that_is_fine_is_refused(capsys):
     quickly = ("certify.robust.runs=1", "certify.robust.bound=0.04")
-    assert cli.run(("shrink", "task=domino_single", *quickly)) == 2
+    assert cli.run(("axis", "shrink", "task=domino_single", *quickly)) == 2
     assert "passes every check of certify=quick; give a scenario that fails one" in capsys.readouterr().err
-    assert cli.run(("shrink", "task=domino_single", "index=-1")) == 2
+    assert cli.run(("axis", "shrink", "task=domino_single", "index=-1")) == 2

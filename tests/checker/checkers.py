@@ -21,13 +21,13 @@ def scengen(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
 
 
 def robosuite(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
-    """`scengen crosscheck`, a second checker with another simulation loop and robosuite's own controller.
+    """`scengen verify robosuite`, a second checker with another simulation loop and robosuite's own controller.
 
     It judges what the witness does in the scene of the file, and nothing else.
     """
     from scengen import cli
 
-    return cli.run(["crosscheck", f"pool={folder}", "limit=1"])
+    return cli.run(["verify", "robosuite", f"pool={folder}", "limit=1"])
 
 
 def always(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
@@ -140,7 +140,7 @@ COMMANDS: dict[str, Checker] = {
     "compare": _command("compare"),
     "report": _command("report", "to=out.html"),
     "subset": _command("subset", "n=1", "to=out"),
-    "robosuite_one": _command("crosscheck", "first=1", *LIMITED),
+    "robosuite_one": _command("verify", "robosuite", "first=1", *LIMITED),
 }
 CHECKERS: dict[str, Checker] = {f.__name__: f for f in (scengen, robosuite, always, parse, hashes, replay)} | COMMANDS
 CONTROLS = ("always", "parse", "hashes")

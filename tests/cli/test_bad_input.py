@@ -17,14 +17,14 @@ def empty(tmp_path_factory):
 @pytest.mark.parametrize(
     "argv",
     [
-        ("audit",),
-        ("compare",),
+        ("report", "audit"),
+        ("report", "compare"),
         ("subset", "to=there"),
         ("attack",),
-        ("crosscheck",),
+        ("verify", "robosuite"),
         ("record", "to=there"),
         ("evaluate", "policy=idle", "to=there"),
-        ("publish", "to=there"),
+        ("export", "hub", "to=there"),
     ],
 )
 def test_a_pool_without_scenarios_is_refused_by_what_needs_some(empty, argv, capsys, tmp_path, monkeypatch):
@@ -46,8 +46,8 @@ REFERENCE = "pool=generated/reference"
         (("asset", "name=cup", "to=cup.stl", "mass=3"), "mass: settings of an imported mesh"),
         (("asset", "mesh=x.stl", "to=x", "friction=nan"), "friction = nan"),
         (("attack", "task=domino_single", "tiers=[]"), "tiers = []; an attack without tiers finds nothing; give some"),
-        (("publish", REFERENCE, "to=there", 'license="a\nb"'), "must be one line of text"),
-        (("publish", REFERENCE, "to=there", "title=' '"), "must be one line of text"),
+        (("export", "hub", REFERENCE, "to=there", 'license="a\nb"'), "must be one line of text"),
+        (("export", "hub", REFERENCE, "to=there", "title=' '"), "must be one line of text"),
         (("verify", REFERENCE, "executor=[]"), "file of conf/executor without .yaml; known: local, ray"),
         (("verify", REFERENCE, "executor={}"), "file of conf/executor without .yaml; known: local, ray"),
         (("verify", REFERENCE, "executor=null"), "conf/executor"),
@@ -55,7 +55,7 @@ REFERENCE = "pool=generated/reference"
         (("tasks", "hydra.searchpath=[pkg://nope.nope]"), "there is no folder pkg://nope.nope; give one"),
         (("tasks", "hydra.searchpath=[pkg://nope]"), "there is no folder pkg://nope; give one"),
         (("generate", "task=packing", "hydra.searchpath=[file:///nowhere]"), "there is no folder file:///nowhere"),
-        (("film", REFERENCE, "id=8ed4", "to=x.png", "raw=true"), "raw = true plays a shortcut"),
+        (("show", "film", REFERENCE, "id=8ed4", "to=x.png", "raw=true"), "raw = true plays a shortcut"),
     ],
 )
 def test_values_without_a_meaning_are_refused_before_any_work(argv, told, capsys, monkeypatch, recwarn):

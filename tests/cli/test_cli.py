@@ -20,7 +20,7 @@ from scengen import cli, list_tasks, load_task
 from scengen.cli import program
 from scengen.cli.commands.settings import read
 from scengen.cli.completion import completions
-from scengen.cli.verbs import RENAMED
+from scengen.cli.verbs import RENAMED, file_stem
 from scengen.demos.generate import DemosSettings
 from scengen.errors import BadConfig
 from scengen.evaluate.settings import EvaluateSettings
@@ -99,12 +99,12 @@ def test_bad_input_ends_in_one_clear_line_and_status_2(capsys, argv, says):
 def test_an_old_name_runs_the_new_command_and_says_so(capsys, monkeypatch, old, new):
     run = []
     monkeypatch.setattr(
-        import_module(f"scengen.cli.commands.{new}"), "command", lambda arguments: run.append(arguments) or 0
+        import_module(f"scengen.cli.commands.{file_stem(new)}"), "command", lambda arguments: run.append(arguments) or 0
     )
     status, err = said(capsys, old, "pool=here")
-    assert status == 0 and run == [["pool=here"]]
-    assert err == f"scengen: `{old}` is now `{new}`; the old name goes with 0.3\n"
-    assert cli.run(("--help",)) == 0 and f"  {old} " not in capsys.readouterr().out
+    assert status == 0 and run == [("pool=here",)]
+    assert err == f"scengen: `{old}` is now `{new}`; the old name goes with 0.4\n"
+    assert cli.run(("--help",)) == 0 and f"\n  {old} " not in capsys.readouterr().out
     assert old not in cli.VERBS and old not in completions(f"scengen {old}", cli.VERBS)
 
 
@@ -163,9 +163,9 @@ def test_an_interrupted_command_says_whether_it_will_continue(capsys, monkeypatc
     def interrupted(arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(import_module(f"scengen.cli.commands.{verb}"), "command", interrupted)
-    status, text = said(capsys, verb)
-    head = (task_files.conf_dir() / "command" / f"{verb}.yaml").read_text().split("# Example")[0]
+    monkeypatch.setattr(import_module(f"scengen.cli.commands.{file_stem(verb)}"), "command", interrupted)
+    status, text = said(capsys, *verb.split())
+    head = task_files.command_file(verb).read_text().split("# Example")[0]
     continues = "to continue" in head
     assert status == 130 and ("is kept" in text) == continues and ("start over" in text) != continues
 
@@ -183,7 +183,7 @@ def test_every_lost_draw_is_counted_with_its_reason(capsys, tmp_path):
 
 @pytest.mark.parametrize("verb", list(cli.VERBS))
 def test_every_command_explains_its_settings(capsys, verb):
-    assert cli.run((verb, "--help")) == 0
+    assert cli.run((*verb.split(), "--help")) == 0
     out = capsys.readouterr().out
     assert out.startswith(f"# scengen {verb}:") and "=" not in out.split("\n")[0]
     assert cli.run(()) == 0 and verb in capsys.readouterr().out
@@ -284,14 +284,14 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
     [
         ("generate", generate.GenerateSettings, {}),
         ("demos", DemosSettings, {}),
-        ("probe", axis_card.AxisSettings, {"axis": "diagonal"}),
-        ("discover", discovery.DiscoverSettings, {}),
+        ("axis card", axis_card.AxisSettings, {"axis": "diagonal"}),
+        ("axis discover", discovery.DiscoverSettings, {}),
         ("evaluate", EvaluateSettings, {"policy": "idle", "pool": "here"}),
         ("record", recording.RecordSettings, {"pool": "here", "to": "there"}),
     ],
 )
 def test_python_and_the_command_line_have_the_same_defaults(verb, kind, given):
-    task = ["task=domino_single"] if verb in ("generate", "demos", "probe", "discover") else []
+    task = ["task=domino_single"] if verb in ("generate", "demos", "axis card", "axis discover") else []
     assert read(verb, [*task, *(f"{name}={value}" for name, value in given.items())], kind) == kind(**given)
 
 

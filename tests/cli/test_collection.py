@@ -54,7 +54,7 @@ def test_a_scenario_is_found_in_whichever_pool_it_is(folder, capsys):
     status, out, _ = told(capsys, "show", f"pool={folder}", f"id={name}")
     assert status == 0
     assert str(name) in out
-    status, _, err = told(capsys, "audit", f"pool={folder}")
+    status, _, err = told(capsys, "report", "audit", f"pool={folder}")
     assert status == 2
     assert "this command accepts one pool" in err
 

@@ -15,6 +15,7 @@ from scengen.cli.commands import generate
 from scengen.cli.commands.settings import read_task
 from scengen.cli.completion import BASH, completions
 from scengen.cli.usage import usage
+from scengen.cli.verbs import parsed
 from scengen.errors import BadConfig
 from scengen.pool import Pool
 from scengen.samplers import task_files
@@ -87,9 +88,9 @@ def test_a_sweep_makes_a_pool_for_each_combination_and_is_continued(capsys, tmp_
 
 
 def test_other_commands_say_that_they_take_one_value(capsys):
-    status, shown = said(capsys, "shrink", DOMINO, "index=0,1")
+    status, shown = said(capsys, "axis", "shrink", DOMINO, "index=0,1")
     assert status == 2 and "has multiple values; give one" in shown.err
-    assert said(capsys, "shrink", "-m", DOMINO)[1].err.startswith("scengen: '-m' is not an option")
+    assert said(capsys, "axis", "shrink", "-m", DOMINO)[1].err.startswith("scengen: '-m' is not an option")
 
 
 # --- what a command would work with ----------------------------------------------------------
@@ -138,7 +139,8 @@ def test_options_that_do_not_exist_are_one_line(capsys, asked, says):
 def test_every_help_has_an_example_that_can_be_composed(verb):
     text = usage(verb, [DOMINO])
     (example,) = re.findall(r"^# Example: (scengen .*)$", text, re.M)
-    program, given, *overrides = shlex.split(example)
+    program, *words = shlex.split(example)
+    given, overrides = parsed(tuple(words))
     assert (program, given) == ("scengen", verb)
     for one in compose.combinations(verb, overrides) if verb == "generate" else [overrides]:
         compose.as_yaml(verb, getattr(one, "overrides", one))
@@ -163,7 +165,10 @@ def test_the_help_of_a_chosen_task_tells_its_splits_alone():
         ("scengen generate task=domino_single,pac", ["task=domino_single,packing"]),
         ("scengen generate task=packing split=t", ["split=tight", "split=turned_bin", "split=thin_heavy"]),
         ("scengen generate task=packing split=tight+l", ["split=tight+large_turns", "split=tight+large_pieces"]),
-        ("scengen probe task=packing axis=i", []),
+        ("scengen axis card task=packing axis=i", []),
+        ("scengen ax", ["axis"]),
+        ("scengen axis d", ["discover"]),
+        ("scengen show f", ["film", "films="]),
         ("scengen generate wor", ["workers="]),
         ("scengen generate task=packing certify=", ["certify=full", "certify=quick"]),
         ("scengen generate task=packing certify.robust.r", ["certify.robust.runs="]),

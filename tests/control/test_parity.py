@@ -7,7 +7,6 @@ that the last bits differ. They stay the last bits until the robot touches somet
 empty jaw finds on itself, or the hand on the pedestal, can hang on a last bit, and all later motion with it.
 """
 
-import hashlib
 import logging
 from collections.abc import Iterator
 from importlib.metadata import version
@@ -18,15 +17,14 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from helpers import needs_robosuite
 from numpy.typing import NDArray
 
 from scengen.control.loop import Loop
-from scengen.robots import panda
-from scengen.versions import ROBOSUITE
+from scengen.installation import ROBOSUITE
+from scengen.robots import files, panda
 
 PERIODS = 200
-ASSETS_SHA256 = "94a5e03ee05120f5ff52c641a4febe6b8fd6ca511e08fad31659703ee7ceed2f"
-"""Hash of robosuite's files in this package, of names and contents in the order of the names."""
 WORLDS = {"one arm": ("Lift", "default", ["Panda"]), "two arms": ("TwoArmLift", "parallel", ["Panda", "Panda"])}
 
 
@@ -47,7 +45,8 @@ def made(name: str, layout: str, robots: list[str]) -> Iterator[Any]:
     logging.disable(logging.WARNING)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("MUJOCO_GL", "disable")  # robosuite sets it to egl on import; the context puts it back
-        robosuite = pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+        needs_robosuite()
+        import robosuite
     env = robosuite.make(
         name,
         robots=robots,
@@ -207,29 +206,19 @@ def test_the_robot_compiles_to_robosuites_numbers(world: Any, kind: str, visual:
             )
 
 
-def test_the_files_of_the_robot_are_robosuites_byte_for_byte() -> None:
-    pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
-    theirs = Path(str(find_spec("robosuite").submodule_search_locations[0])) / "models" / "assets"
-    ours = [path for path in panda.ASSETS.rglob("*") if path.suffix in (".xml", ".stl", ".obj")]
-    assert len(ours) == 67 and version("robosuite") == ROBOSUITE
-    for path in ours:
-        assert path.read_bytes() == (theirs / path.relative_to(panda.ASSETS)).read_bytes(), path
-
-
-def test_the_files_of_the_robot_are_those_of_the_release() -> None:
-    """Where robosuite is missing, too: one hash over all of them."""
-    digest = hashlib.sha256()
-    for path in sorted(panda.ASSETS.rglob("*")):
-        if path.suffix in (".xml", ".stl", ".obj"):
-            digest.update(f"{path.relative_to(panda.ASSETS).as_posix()}\n".encode() + path.read_bytes())
-    assert digest.hexdigest() == ASSETS_SHA256
+def test_the_hashes_of_the_robots_files_are_those_of_the_installed_robosuite() -> None:
+    if (robosuite := find_spec("robosuite")) is None or not robosuite.submodule_search_locations:
+        pytest.skip("no robosuite; it is an extra")
+    theirs = Path(robosuite.submodule_search_locations[0]) / "models" / "assets"
+    assert len(files.hashes()) == 67 and version("robosuite") == ROBOSUITE
+    for name in files.hashes():
+        assert files.is_ours(name, (theirs / name).read_bytes()), name
 
 
 def test_every_mesh_of_the_robot_is_one_of_these_files() -> None:
     scene = mujoco.MjSpec()
     panda.attach(scene, visual=True)
-    assert len(scene.meshes) > 60
-    assert all(panda.mesh_file(mesh.name, mesh.file).is_file() for mesh in scene.meshes)
+    assert len({panda.mesh_file(mesh.name, mesh.file) for mesh in scene.meshes}) == 64
 
 
 def test_home_is_robosuites(lift: Any) -> None:

@@ -67,7 +67,7 @@ def test_every_task_of_the_paper_has_a_length():
 
 
 def test_the_command_writes_a_page_and_json(made, tmp_path, capsys):
-    given = ["stats", f"data={made}", f"to={tmp_path / 'page.html'}", f"json={tmp_path / 'stats.json'}"]
+    given = ["curate", "stats", f"data={made}", f"to={tmp_path / 'page.html'}", f"json={tmp_path / 'stats.json'}"]
     assert cli.run(given) == 0
     assert "domino_single" in capsys.readouterr().out
     (own,) = json.loads((tmp_path / "stats.json").read_text())
@@ -83,4 +83,4 @@ def test_what_cannot_be_measured_is_one_line(made, tmp_path):
     pq.write_table(pq.read_table(path).drop_columns(["robot0_eef_pos"]), path)
     with pytest.raises(BadConfig, match="lacks the column robot0_eef_pos; see scengen curate"):
         statistics_of([Recording.open(folder)])
-    assert cli.run(["stats", f"data={made}", f"to={tmp_path / 'page.pdf'}"]) == 2
+    assert cli.run(["curate", "stats", f"data={made}", f"to={tmp_path / 'page.pdf'}"]) == 2

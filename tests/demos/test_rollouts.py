@@ -50,17 +50,17 @@ def test_a_rollout_that_failed_is_filmed(kept, tmp_path, capsys):
     folder = kept / "random" / "rollouts" / REFERENCE.name
     (row, *_) = Demonstrations.open(folder).failures()
     film = [f"pool={folder}", f"id={row.id[:8]}", f"to={tmp_path / 'film.png'}", "frames=2", "width=64", "height=48"]
-    assert cli.run(["film", *film]) == 0 and (tmp_path / "film.png").stat().st_size
+    assert cli.run(["show", "film", *film]) == 0 and (tmp_path / "film.png").stat().st_size
     assert f"{row.name}, run 0 (policy): {row.outcome} after {row.seconds:g} s: {row.reason}" in capsys.readouterr().out
     for wrong, says in (
         (["run=3"], "run = 3; of this scenario there are 0"),
         (["of=push_the_slab"], "of = push_the_slab; what is filmed of demonstrations is the run itself"),
         (["id=zzz"], f"no scenario in {folder} named 'zzz'"),
     ):
-        assert cli.run(["film", *film, *wrong]) == 2
+        assert cli.run(["show", "film", *film, *wrong]) == 2
         err = capsys.readouterr().err
         assert says in err and err.count("\n") == 1
-    assert cli.run(["film", f"pool={REFERENCE}", *film[1:], "run=0"]) == 2
+    assert cli.run(["show", "film", f"pool={REFERENCE}", *film[1:], "run=0"]) == 2
     assert "a scenario of a pool has one witness" in capsys.readouterr().err
 
 
@@ -70,7 +70,7 @@ def test_a_prefix_of_several_ids_names_no_rollout(tmp_path, capsys):
     folder = tmp_path / "idle" / "rollouts" / REFERENCE.name
     start = next(a for a, b in pairwise(sorted(row.id[0] for row in Demonstrations.open(folder).attempts())) if a == b)
     capsys.readouterr()
-    assert cli.run(["film", f"pool={folder}", f"id={start}", f"to={tmp_path / 'film.png'}"]) == 2
+    assert cli.run(["show", "film", f"pool={folder}", f"id={start}", f"to={tmp_path / 'film.png'}"]) == 2
     assert f"'{start}' begins 2 ids in {folder}" in capsys.readouterr().err
 
 

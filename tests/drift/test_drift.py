@@ -138,7 +138,7 @@ def here(tmp_path_factory):
 def test_an_environment_shares_everything_but_mujoco(made, here, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(drift, "environment", lambda version, told: here)
     report = tmp_path / "drift.json"
-    given = ("drift", f"pool={made.folder}", f"mujoco={HERE}", "n=1", "level=replay", f"json={report}")
+    given = ("verify", "mujoco", f"pool={made.folder}", f"mujoco={HERE}", "n=1", "level=replay", f"json={report}")
     assert cli.run(given) == 0
     assert "1 / 0 / 0" in capsys.readouterr().out
     told = json.loads(report.read_text())
@@ -148,7 +148,7 @@ def test_an_environment_shares_everything_but_mujoco(made, here, monkeypatch, ca
 @pytest.mark.slow
 def test_an_environment_with_a_mujoco_that_it_should_not_have_is_refused(made, here, monkeypatch, capsys):
     monkeypatch.setattr(drift, "environment", lambda version, told: replace(here, mujoco=version))
-    assert cli.run(("drift", f"pool={made.folder}", "mujoco=[3.4.0]", "level=replay")) == 2
+    assert cli.run(("verify", "mujoco", f"pool={made.folder}", "mujoco=[3.4.0]", "level=replay")) == 2
     assert f"the environment of mujoco 3.4.0 imports {HERE}" in capsys.readouterr().err
 
 
@@ -200,11 +200,11 @@ def test_another_mujoco_is_really_another_one(made, tmp_path, monkeypatch, capsy
     """An environment from the package index: the bits of both scenarios are others, their verdicts are not."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     report = tmp_path / "drift.json"
-    assert cli.run(("drift", f"pool={made.folder}", "mujoco=[3.4.0]", f"json={report}")) == 0
+    assert cli.run(("verify", "mujoco", f"pool={made.folder}", "mujoco=[3.4.0]", f"json={report}")) == 0
     told = json.loads(report.read_text())
     assert cell(told["tasks"]["domino_single"]["3.4.0"]) == "0 / 2 / 0"
     assert "as the control" in capsys.readouterr().err
-    assert cli.run(("drift", f"pool={made.folder}", "mujoco=[3.4.99]")) == 2
+    assert cli.run(("verify", "mujoco", f"pool={made.folder}", "mujoco=[3.4.99]")) == 2
     assert "there is no mujoco 3.4.99 for this Python" in capsys.readouterr().err
     assert [path.name for path in (tmp_path / "scengen").glob("mujoco-*[!k]")] == [
         path.name for path in (tmp_path / "scengen").glob("mujoco-3.4.0-????????????")

@@ -10,7 +10,7 @@ from unittest import mock
 import mujoco
 import numpy as np
 import pytest
-from helpers import REFERENCE, pictures_are_possible
+from helpers import REFERENCE, needs_robosuite, pictures_are_possible
 from pools import certificate_of
 
 from scengen import list_tasks, load_task
@@ -22,6 +22,7 @@ from scengen.envs.gym import PoolEnv
 from scengen.envs.object_state import RESOLUTION
 from scengen.episode import Episode
 from scengen.errors import BadConfig, PoolError, UnknownName
+from scengen.installation import versions
 from scengen.pool import Pool
 from scengen.pool.row import NO_WITNESS
 from scengen.robots import panda
@@ -30,10 +31,10 @@ from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.validate.certify import Certified
 from scengen.validate.rebuilt import rebuild
-from scengen.versions import versions
 
-robosuite = pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+needs_robosuite()
 # ruff: noqa: E402
+import robosuite
 from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
 from robosuite.wrappers import DataCollectionWrapper, GymWrapper, VisualizationWrapper
 
@@ -503,7 +504,7 @@ def test_the_command_fails_below_the_limit(differing, status, monkeypatch, tmp_p
     fake.left = differing
     monkeypatch.setattr(agreement, "compare", fake)
     file = tmp_path / "result.json"
-    assert scengen(["crosscheck", f"pool={REFERENCE}", f"json={file}"]) == status
+    assert scengen(["verify", "robosuite", f"pool={REFERENCE}", f"json={file}"]) == status
     result = json.loads(file.read_text())
     assert result["same"] == len(Pool.open(REFERENCE)) - differing == len(result["scenarios"]) - differing
 
@@ -511,7 +512,7 @@ def test_the_command_fails_below_the_limit(differing, status, monkeypatch, tmp_p
 @pytest.mark.parametrize("given", ["limit=1.5", "first=0", "workers=0", "limt=1", "pool=nowhere"])
 def test_the_command_explains_bad_input(given, capsys):
     pool = [] if given.startswith("pool") else [f"pool={REFERENCE}"]
-    assert scengen(["crosscheck", *pool, given]) == 2
+    assert scengen(["verify", "robosuite", *pool, given]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 

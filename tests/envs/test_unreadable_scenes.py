@@ -4,7 +4,7 @@ import shutil
 from dataclasses import replace
 
 import pytest
-from helpers import REFERENCE, env_class
+from helpers import REFERENCE, env_class, needs_robosuite
 
 from scengen import cli, load_task
 from scengen.attack.campaign import certified, player_of
@@ -47,9 +47,9 @@ def test_a_scene_that_mujoco_does_not_read_is_one_line(pool, tmp_path, use):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("command", ["export to={to}", "record to={to}", "crosscheck"])
+@pytest.mark.parametrize("command", ["export to={to}", "record to={to}", "verify robosuite"])
 def test_commands_end_with_status_2(pool, tmp_path, capsys, command):
-    if command == "crosscheck":
-        pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+    if command == "verify robosuite":
+        needs_robosuite()
     assert cli.run([*command.format(to=tmp_path / "to").split(), f"pool={pool}"]) == 2
     assert "MuJoCo does not read the scene" in capsys.readouterr().err.splitlines()[-1]

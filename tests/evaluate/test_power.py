@@ -101,9 +101,9 @@ def test_an_analysis_that_makes_no_sense_is_refused(wrong):
 def test_the_command_answers_both_ways(tmp_path, capsys):
     told = tmp_path / "power.json"
     arguments = ("seeds=8", "rollouts=12", "correlation=0", "success=0.7", "drop=0.2", f"json={told}")
-    assert cli.run(("power", *arguments)) == 0
+    assert cli.run(("evaluate", "power", *arguments)) == 0
     result = json.loads(told.read_text())
     assert 8 < result["seeds_needed"] < 30 and 0.2 < result["smallest_drop"] < 0.5
     assert "a drop of" in capsys.readouterr().out
-    assert cli.run(("power", "success=0.5", "drop=0.6")) == 2
-    assert cli.run(("power", "seeds=1")) == 2
+    assert cli.run(("evaluate", "power", "success=0.5", "drop=0.6")) == 2
+    assert cli.run(("evaluate", "power", "seeds=1")) == 2

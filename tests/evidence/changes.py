@@ -3,10 +3,10 @@
     python tests/evidence/changes.py [refactorings|changes] [NAME ...]
 
 Each edit of the lists in `refactorings_*.py` and `changes_*.py` is applied to a temporary copy of the tree, in which
-its tasks are compared with their stored behaviour: all core rollouts. A refactoring must not make a task another one. A
-change must be noticed, with the kind of difference that the edit names. One line per edit says what still reproduces
-(bits, verdicts, no) and which kinds differ; generated/changes.jsonl collects the results. The exit status is 1 if an
-edit is judged otherwise than it must be.
+its tasks are compared with their stored behaviour: all core rollouts, or all rollouts if the edit says so. A
+refactoring must not make a task another one. A change must be noticed, with the kind of difference that the edit names.
+One line per edit says what still reproduces (bits, verdicts, no) and which kinds differ; generated/changes.jsonl
+collects the results. The exit status is 1 if an edit is judged otherwise than it must be.
 
 An edit says which text it replaces. If the code has moved, the command names the edit that has to be mended.
 """
@@ -26,7 +26,9 @@ import refactorings_ground
 import refactorings_moves
 import refactorings_tasks_a_to_k
 import refactorings_tasks_l_to_z
-from edit import ROOT, Edit, StaleEdit, apply, copied
+from edit import ROBOT, ROOT, Edit, StaleEdit, apply, copied
+
+from scengen.robots import files
 
 REFACTORINGS = (refactorings_ground, refactorings_moves, refactorings_tasks_a_to_k, refactorings_tasks_l_to_z)
 CHANGES = (changes_below, changes_rules, changes_tasks)
@@ -42,11 +44,13 @@ TIME_LIMIT = 600
 JUDGE = """
 import json, pathlib, sys
 from scengen import load_task
-from scengen.evidence.behaviour import Behaviour
+from scengen.evidence.behaviour import Behaviour, is_core
 from scengen.evidence.comparison import compare
-for name in sys.argv[1:]:
+longer = sys.argv[1] == "longer"
+for name in sys.argv[2:]:
     stored = pathlib.Path("conf", "behaviour", f"{name}.json")
-    found = compare(load_task(name), Behaviour.read(stored))
+    wanted = (lambda name: True) if longer else is_core
+    found = compare(load_task(name), Behaviour.read(stored), wanted, every_split=longer)
     told = [[each.kind, each.level, str(each)] for each in found.differences]
     print(json.dumps([name, found.reproduces, told]), flush=True)
 """
@@ -61,8 +65,8 @@ def compared(edit: Edit) -> dict[str, Any]:
     """
     with copied() as tree:
         apply(edit, tree)
-        command = [sys.executable, "-c", JUDGE, *edit.tasks]
-        variables = {**os.environ, "PYTHONPATH": str(tree)}
+        command = [sys.executable, "-c", JUDGE, "longer" if edit.longer else "core", *edit.tasks]
+        variables = {**os.environ, "PYTHONPATH": str(tree), files.VARIABLE: str(tree / ROBOT)}
         try:
             done = subprocess.run(command, cwd=tree, env=variables, capture_output=True, text=True, timeout=TIME_LIMIT)
         except subprocess.TimeoutExpired:

@@ -2,8 +2,8 @@
 
 from edit import Edit
 
-GRIPPER = "scengen/robots/robosuite_assets/grippers/panda_gripper.xml"
-ARM_MODEL = "scengen/robots/robosuite_assets/robots/panda/robot.xml"
+GRIPPER = "robot/grippers/panda_gripper.xml"
+ARM_MODEL = "robot/robots/panda/robot.xml"
 PANDA, PROP, BOX = "scengen/robots/panda.py", "scengen/assets/prop.py", "scengen/assets/box.py"
 EPISODE, WORLD, PREDICATES = "scengen/episode.py", "scengen/sim/world.py", "scengen/predicates.py"
 OSC, LOOP = "scengen/control/osc.py", "scengen/control/loop.py"

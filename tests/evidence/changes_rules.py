@@ -215,7 +215,7 @@ EDITS = (
         ("cube_toss",),
         ((TOSS, "self.bearing) * math.radians(self.rate))", "self.bearing) * math.radians(1.02 * self.rate))"),),
         EVENT,
-        misjudged="core rollouts and stored states are of the first training draw",
+        longer=True,
     ),
     Edit(
         "rule_of_an_axis_alone",
@@ -228,6 +228,6 @@ EDITS = (
             ),
         ),
         RULE,
-        misjudged="core rollouts and stored states are of the first training draw",
+        longer=True,
     ),
 )

@@ -178,8 +178,9 @@ EDITS = (
         "plan_of_a_step",
         ("domino_single",),
         ((DOMINO, "self.topple(world, self.count // 2)", "self.topple(world, 1)"),),
-        DECLARED,
-        misjudged="of steps() the names alone are observed",
+        ("steps",),
+        least="bits",
+        longer=True,
     ),
     Edit(
         "question_about_the_scene",

@@ -1,5 +1,6 @@
 """Edits of the source tree, which are applied in a temporary copy of it."""
 
+import hashlib
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,9 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from scengen.robots import files
+
 ROOT = Path(__file__).parents[2]
-ASSETS = Path("scengen/robots/robosuite_assets")
-"""Folder of the robot's meshes, of 40 MB: the copy refers to its files by links."""
+ROBOT = Path("robot")
+"""Folder of the robot's files in the copy, of 40 MB: links to the files that this process reads."""
+HASHES = Path("scengen/robots/files.json")
+"""File with the hashes of the robot's files. An edit of one of them changes its hash, too."""
 NEW = ""
 """Old text of a file that an edit adds."""
 STALE = "mend this edit, because the code has moved"
@@ -30,6 +35,8 @@ class Edit:
     """Kinds of differences of which each task must report at least one; empty for a refactoring."""
     least: str = "version"
     """Least level of such a difference, `version` or `bits`."""
+    longer: bool = False
+    """Whether all rollouts of all splits are played, as before a release, and not only those of every change."""
     rounds: bool = False
     """Whether a refactoring may change the last bits."""
     misjudged: str = ""
@@ -56,26 +63,32 @@ def apply(edit: Edit, tree: Path) -> None:
         text = path.read_text() if path.is_file() else ""
         if (count := text.count(old)) != 1:
             raise StaleEdit(f"{edit.name}: {old.strip().splitlines()[0]!r} occurs {count} times in {file}; {STALE}")
-        if path.is_symlink() or ASSETS in Path(file).parents:
-            path.unlink()
+        if ROBOT in Path(file).parents:
+            path.unlink()  # a link to a file that is not ours
+            _swap_hash(tree, text, text.replace(old, new))
         path.write_text(text.replace(old, new))
+
+
+def _swap_hash(tree: Path, old: str, new: str) -> None:
+    """Let a tree expect a new text of one of the robot's files."""
+    before, after = (hashlib.sha256(text.encode()).hexdigest() for text in (old, new))
+    expected = (tree / HASHES).read_text()
+    assert expected.count(before) == 1
+    (tree / HASHES).write_text(expected.replace(before, after))
 
 
 @contextmanager
 def copied() -> Iterator[Path]:
-    """A temporary copy of the code and its configuration, with the machine code that is compiled already."""
+    """A temporary copy of the code and its configuration, with the machine code that is compiled already.
+
+    Code in it finds the robot's files if `files.VARIABLE` names the folder `ROBOT` in it.
+    """
     with TemporaryDirectory() as folder:
         tree = Path(folder)
-        shutil.copytree(ROOT / "scengen", tree / "scengen", ignore=_without_assets)
+        shutil.copytree(ROOT / "scengen", tree / "scengen")
         shutil.copytree(ROOT / "conf", tree / "conf")
-        for file in (ROOT / ASSETS).rglob("*"):
-            if file.is_file():
-                there = tree / file.relative_to(ROOT)
-                there.parent.mkdir(parents=True, exist_ok=True)
-                there.symlink_to(file)
+        for name in files.hashes():
+            there = tree / ROBOT / name
+            there.parent.mkdir(parents=True, exist_ok=True)
+            there.symlink_to(files.checked(name))
         yield tree
-
-
-def _without_assets(folder: str, names: list[str]) -> list[str]:
-    """Names in a folder that are not copied."""
-    return [name for name in names if Path(folder, name) == ROOT / ASSETS]

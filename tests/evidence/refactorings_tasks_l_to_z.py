@@ -109,7 +109,6 @@ EDITS = (
                 '        return "lifted_" + cube',
             ),
         ),
-        misjudged="flags in the memory are tried at negative values, which no episode reaches",
     ),
     Edit(
         "occluder_build_without_iterator",

@@ -142,7 +142,9 @@ def test_of_several_rows_of_a_split_the_largest_is_shown(empty):
 
 
 def test_certification_is_measured_once(empty, monkeypatch):
-    certified = pytest.importorskip("certified", reason="no robosuite, in which the tool plays witnesses")
+    certified = pytest.importorskip(
+        "certified", reason="no robosuite, in which the tool plays witnesses", exc_type=ImportError
+    )
     calls = []
     monkeypatch.setattr(certified, "measured", lambda task, split, **asked: calls.append(split) or {"indices": 3})
     splits = ["id", *TASK.axes]

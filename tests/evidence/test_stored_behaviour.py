@@ -45,6 +45,7 @@ def cheats(task, monkeypatch):
 
 
 @of_stored_pools
+@pytest.mark.slow(each_change=True)
 @pytest.mark.parametrize("task", list_tasks())
 def test_a_task_behaves_as_it_is_stored(task, monkeypatch):
     known = cheats(task, monkeypatch)
@@ -66,7 +67,8 @@ def test_a_cheat_is_stored_for_each_one_that_is_kept(monkeypatch):
 
 
 OPEN = {("packing", "id 0 cheat try_places")}
-"""Kept cheats that reach the goal in the stored draw, although most draws are closed to them."""
+"""Kept cheats that reach the goal in the stored draw, although most draws are closed to them. A guess of one of the
+twelve arrangements of `packing` is right in a tenth of the draws: each piece of this one goes in at its first try."""
 
 
 def test_no_kept_cheat_and_no_shortcut_reaches_the_goal():
@@ -86,7 +88,7 @@ def test_a_higher_version_has_a_line_under_draws():
 
 def of_version(plain):
     """The parts of a file that a version fixes. Entries of new axes may be added."""
-    fixed = {name: plain[name] for name in ("constraints", "answers", "contacts", "states", "limits")}
+    fixed = {name: plain.get(name) for name in ("reasons", "constraints", "answers", "contacts", "states", "limits")}
     played = {name: result[0] for name, result in plain["rollouts"].items() if result[-1] != "unsteady"}
     return fixed, {**plain["declared"], **plain["draws"], **played}
 
@@ -244,18 +246,21 @@ def test_a_limit_is_between_the_places_at_which_the_rules_are_asked(task):
     before = stored(task.name)
     stage = Stage(task.draw("id", SEED, 0).scenario, task.embodiment, task.horizon)
     assert before.limits
+    contacts = [rules.Contact(*each) for each in before.contacts]
     for state, text, magnitude, low, high, _ in before.limits:
-        probe = rules.Probe(stage.scenario, stage.world, unpacked(before.states[state]["state"]))
-        sides = probe.around(rules.Coordinate.parse(text), magnitude)
+        probe = rules.Probe(stage.scenario, stage.world, unpacked(before.states[state]["state"]), contacts)
+        sides = probe.around(rules.Place.parse(text), magnitude)
         assert [list(side) for side in sides] == [[before.answers[k] for k in each] for each in (low, high)]
         assert low != high
 
 
 def test_a_constraint_is_stored_on_both_sides_of_its_limit(task):
     start = [task.draw("id", SEED, index).scenario for index in range(3)]
-    for plain in stored(task.name).constraints:
-        edge = Edge.of(plain)
-        assert edge.again(start[edge.start]) == edge and edge.before != edge.after and edge.plain == plain
+    before = stored(task.name)
+    for plain in before.constraints:
+        edge = Edge.of(plain, before.reasons)
+        assert edge.again(start[edge.start]) == edge and edge.before != edge.after
+        assert edge.plain([*before.reasons]) == plain
 
 
 def test_writing_again_keeps_states_and_marks(task):

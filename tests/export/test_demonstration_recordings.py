@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from helpers import REFERENCE
+from helpers import REFERENCE, needs_robosuite
 
 from scengen import cli
 from scengen.cli.commands.settings import read_task
@@ -118,7 +118,7 @@ def test_pools_and_demonstrations_are_recorded_separately(recorded, tmp_path, ca
 
 def test_robomimic_gets_every_run_and_its_environment_plays_it(recorded, tmp_path):
     """As robomimic's environment does: make from `env_args`, restore `ep_meta`, model and state, then act."""
-    pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+    needs_robosuite()
     from robosuite.environments.base import REGISTERED_ENVS
 
     path, rows = tmp_path / "demos.hdf5", list(Demonstrations.open(recorded / "demos").rows())

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from helpers import REFERENCE
+from helpers import REFERENCE, needs_robosuite
 
 from scengen.pool import Pool
 
@@ -17,7 +17,7 @@ COMMANDS = {
     "record lerobot with cameras": ("record to={to} n=1 width=160 height=120 cameras=[rgb_exo_right_cam]", 20),
     "export": ("export to={to}", 30),
     "export without robot": ("export to={to} robot=false", 2),
-    "publish": ("publish to={to}", 20),
+    "export hub": ("export hub to={to}", 20),
     "report": ("report to={to}.html", 20),
     "subset": ("subset to={to} n=2", 10),
     "verify": ("verify json={to}.json level=replay", 1),
@@ -36,7 +36,7 @@ def limited(command, kilobytes, to):
 @pytest.mark.slow
 def test_a_file_that_cannot_grow_is_one_line_and_leaves_nothing(tmp_path, name):
     if name == "record robomimic":
-        pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+        needs_robosuite()
     command, kilobytes = COMMANDS[name]
     status, told = limited(command, kilobytes, tmp_path / "new")
     lines = [line for line in told.splitlines() if not line.startswith(("verify ", "export ", "record "))]
@@ -59,7 +59,7 @@ def test_a_film_before_is_kept(tmp_path):
     film = tmp_path / "new.mp4"
     film.write_bytes(b"film before")
     scenario = next(iter(Pool.open(REFERENCE).rows())).id
-    status, told = limited(f"film to={film} id={scenario} fps=10 width=160 height=120", 2, tmp_path / "new")
+    status, told = limited(f"show film to={film} id={scenario} fps=10 width=160 height=120", 2, tmp_path / "new")
     assert status == 2 and told.splitlines()[-1].endswith(
         "file too large; raise the limit of the size of files (ulimit -f) and repeat the command"
     ), told

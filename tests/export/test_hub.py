@@ -25,7 +25,7 @@ POOLS = (BASE / "single_severity", BASE / "mirror_id")
 
 def card(*pools, to, **settings):
     given = [f"{name}={value}" for name, value in settings.items()]
-    return cli.run(["publish", f"pool={','.join(map(str, pools))}", f"to={to}", *given])
+    return cli.run(["export", "hub", f"pool={','.join(map(str, pools))}", f"to={to}", *given])
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +142,7 @@ def test_a_certificate_that_does_not_hold_gets_no_card(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ([], "publish needs pool=...; see scengen publish --help"),
+        ([], "export hub needs pool=...; see scengen export hub --help"),
         (["pool=nowhere"], "no pool at nowhere"),
         ([f"pool={REFERENCE}", f"to={REFERENCE}"], "is not empty; delete it, or name another folder"),
         ([f"pool={REFERENCE}", "level=all"], "level = all; it must be replay or recheck or full"),
@@ -154,6 +154,6 @@ def test_a_certificate_that_does_not_hold_gets_no_card(tmp_path, capsys):
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(tmp_path, capsys, arguments, says):
-    assert cli.run(["publish", f"to={tmp_path / 'out'}", *arguments]) == 2
+    assert cli.run(["export", "hub", f"to={tmp_path / 'out'}", *arguments]) == 2
     err = capsys.readouterr().err
     assert says in err and err.count("\n") == 1 and not list(tmp_path.iterdir())

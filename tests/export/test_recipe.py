@@ -117,7 +117,7 @@ def test_what_cannot_be_trained_is_refused_before_anything_is_written(recorded, 
 
 
 def test_the_command_tells_what_to_run_next(recorded, tmp_path, capsys):
-    argv = ["recipe", "train=lerobot_act", f'data="{recorded}"', f"to={tmp_path / 'to'}"]
+    argv = ["export", "recipe", "train=lerobot_act", f'data="{recorded}"', f"to={tmp_path / 'to'}"]
     assert cli.run(argv) == 0
     told = capsys.readouterr().out
     assert "requirements.txt, smoke.sh, train.sh, evaluate.sh" in told and f"sh {tmp_path / 'to' / 'smoke.sh'}" in told

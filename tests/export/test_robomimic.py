@@ -6,7 +6,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from helpers import REFERENCE, pictures_are_possible
+from helpers import REFERENCE, needs_robosuite, pictures_are_possible
 
 from scengen import cli
 from scengen.envs.gym import PoolEnv
@@ -17,7 +17,8 @@ from scengen.export.recording import RecordSettings, record
 from scengen.pool import Pool
 from scengen.sim.world import World
 
-robosuite = pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+needs_robosuite()
+import robosuite  # noqa: E402
 from robosuite.environments.base import REGISTERED_ENVS  # noqa: E402
 
 PROPRIOCEPTION = ("robot0_eef_pos", "robot0_eef_quat", "robot0_gripper_qpos")

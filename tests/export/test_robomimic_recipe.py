@@ -143,6 +143,6 @@ def test_what_cannot_be_trained_is_refused_before_anything_is_written(tmp_path):
 
 def test_the_command_tells_what_to_run_next(tmp_path, capsys):
     data = recorded(tmp_path / "data.hdf5")
-    assert cli.run(["recipe", f"train={NAME}", f'data="{data}"', f"to={tmp_path / 'to'}"]) == 0
+    assert cli.run(["export", "recipe", f"train={NAME}", f'data="{data}"', f"to={tmp_path / 'to'}"]) == 0
     told = capsys.readouterr().out
     assert "requirements.txt, train.json, smoke.json" in told and "arXiv 2108.03298" in told

@@ -167,7 +167,7 @@ NONSENSE = {
     "title": ['"a\nb"', "' '", "# x"],
     "ycb": ["nowhere", "."],
     "what": ["jitter", "jitter:", "jitter:-1", "jitter:1.5", "jitter:99999", "witness", "Oracle", "oracle,witness"],
-    "film": ["x", "x.gif", ".mp4", "/nowhere/x.mp4", "x.png/"],
+    "show film": ["x", "x.gif", ".mp4", "/nowhere/x.mp4", "x.png/"],
     "executor": ["[]", "{}", "null", "[local]", "''"],
     "certify": ["[]", "{}", "null", "''"],
     "hydra.searchpath": [
@@ -186,10 +186,7 @@ NONSENSE = {
 }
 """Values that look plausible and have no meaning, by setting."""
 
-SETTINGS = {
-    verb: re.findall(r"^(\w+):", (task_files.conf_dir() / "command" / f"{verb}.yaml").read_text(), re.M)
-    for verb in cli.VERBS
-}
+SETTINGS = {verb: re.findall(r"^(\w+):", task_files.command_file(verb).read_text(), re.M) for verb in cli.VERBS}
 """Settings of every command, from its file."""
 WITH_TASK = [verb for verb, names in SETTINGS.items() if "defaults" in names]
 
@@ -216,7 +213,7 @@ class Grammar:
             self._spoil(verb, settings)
         line = [f"{key}={value}" if value is not None else key for key, value in settings]
         pick.shuffle(line)
-        return [verb, *line]
+        return [*verb.split(), *line]
 
     def _plausible(self, verb: str) -> list[tuple[str, str | None]]:
         """What a command needs to begin its work."""
@@ -228,12 +225,12 @@ class Grammar:
             made = verb == "generate"
             found.append(("pool", str(self.place / "new" / "pool") if made else str(self.pool)))
         if "to" in names:
-            suffix = {"film": ".png", "report": ".html", "asset": ".stl"}.get(verb, "")
+            suffix = {"show film": ".png", "report": ".html", "asset": ".stl"}.get(verb, "")
             found.append(("to", str(self.place / "new" / f"target{suffix}")))
         given = {
-            "probe": ("axis", "wide_gaps"),
-            "film": ("id", "0"),
-            "view": ("id", "0"),
+            "axis card": ("axis", "wide_gaps"),
+            "show film": ("id", "0"),
+            "show view": ("id", "0"),
             "try": ("index", "1") if found else ("id", "0"),
             "evaluate": ("policy", "idle"),
             "asset": ("name", "cup"),

@@ -13,7 +13,6 @@ import tempfile
 import time
 import traceback
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from unittest import mock
 
@@ -23,6 +22,7 @@ sys.path[:0] = [str(ROOT), str(Path(__file__).parents[1])]
 from fuzz.grammar import Grammar  # noqa: E402
 from scengen import cli  # noqa: E402
 from scengen.cli.program import MAX_LINE  # noqa: E402
+from scengen.cli.verbs import file_stem  # noqa: E402
 
 REFERENCE = ROOT / "generated" / "reference"
 LIMIT = 60
@@ -98,13 +98,22 @@ def playground() -> Iterator[Path]:
         os.chdir(Path(made, "cwd"))
         stack.enter_context(mock.patch.object(tempfile, "tempdir", made))
         for verb in cli.VERBS:  # a command that is first imported now would keep what takes the place of its work
-            importlib.import_module(f"scengen.cli.commands.{verb}")
-        for name in WORK if find_spec("robosuite") else set(WORK) - ROBOSUITE_WORK:
+            importlib.import_module(f"scengen.cli.commands.{file_stem(verb)}")
+        for name in WORK if robosuite_runs() else set(WORK) - ROBOSUITE_WORK:
             stack.enter_context(mock.patch(name, side_effect=Work))
         try:
             yield place
         finally:
             shutil.rmtree(place, ignore_errors=True)
+
+
+def robosuite_runs() -> bool:
+    """Whether robosuite's environments run here."""
+    try:
+        importlib.import_module("scengen.envs.robosuite_models")
+    except ImportError:
+        return False
+    return True
 
 
 WORK = (
@@ -115,14 +124,14 @@ WORK = (
     "scengen.export.recording.unplayable",
     "scengen.validate.verify.pools.verify",
     "scengen.cli.commands.verify.verify",
-    "scengen.cli.commands.drift.environment",
+    "scengen.cli.commands.verify_mujoco.environment",
     "scengen.cli.commands.attack.attack",
     "scengen.cli.commands.bench.bench",
-    "scengen.cli.commands.shrink.certify",
+    "scengen.cli.commands.axis_shrink.certify",
     "scengen.cli.commands.try._played",
-    "scengen.cli.commands.probe.make_axis_card",
+    "scengen.cli.commands.axis_card.make_axis_card",
     "scengen.cli.commands.edition.differences",
-    "scengen.cli.commands.discover.discover",
+    "scengen.cli.commands.axis_discover.discover",
     "scengen.export.recording._writer",
     "scengen.export.hub.publish",
     "scengen.envs.agreement.compare_all",

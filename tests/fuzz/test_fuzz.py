@@ -64,14 +64,14 @@ def test_what_nobody_thought_of_is_one_line_and_a_file(monkeypatch, capsys, tmp_
         raise error
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr("scengen.cli.commands.power.command", fail)
-    assert cli.run(["power"]) == 2
+    monkeypatch.setattr("scengen.cli.commands.evaluate_power.command", fail)
+    assert cli.run(["evaluate", "power"]) == 2
     told = capsys.readouterr().err
     (file,) = tmp_path.iterdir()
     assert told.count("\n") == 1 and str(file) in told and type(error).__name__ in file.read_text()
     (tmp_path / "gone").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone" / "nowhere"))
-    assert cli.run(["power"]) == 2 and capsys.readouterr().err.count("\n") == 1
+    assert cli.run(["evaluate", "power"]) == 2 and capsys.readouterr().err.count("\n") == 1
 
 
 def test_text_of_a_pool_is_shown_and_not_obeyed(capsys):

@@ -92,7 +92,7 @@ def test_a_pool_with_scans_is_attacked_as_it_is(folder, tmp_path, capsys):
     assert cli.run(["verify", f"hits={found}", f"pool={pool}"]) == 0
     assert cli.run(["verify", f"hits={found}"]) == 1
     assert "one of a pool with scans needs pool=FOLDER too" in capsys.readouterr().out
-    assert cli.run(["film", f"hit={next(found.glob('*.npz'))}", f"to={tmp_path / 'film.png'}"]) == 2
+    assert cli.run(["show", "film", f"hit={next(found.glob('*.npz'))}", f"to={tmp_path / 'film.png'}"]) == 2
     assert "one of a pool with scans needs pool=FOLDER too" in capsys.readouterr().err
 
 

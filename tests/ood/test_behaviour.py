@@ -63,7 +63,17 @@ def test_twins_are_not_tried_twice(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
     far = "task.id.x=[uniform,0.0,0.2]"  # with a stout first tile the chain of index 1 leaves the table
-    argv = ("probe", "task=domino_single", "axis=stout_starter", "n=2", "any_n=0", "rounds=1", far, f"to={tmp_path}")
+    argv = (
+        "axis",
+        "card",
+        "task=domino_single",
+        "axis=stout_starter",
+        "n=2",
+        "any_n=0",
+        "rounds=1",
+        far,
+        f"to={tmp_path}",
+    )
     assert cli.run((*argv, "certify.robust.runs=1", "certify.robust.bound=0.04")) == 0
     card = json.loads((tmp_path / "card.json").read_text())
     assert card["proofs"][0]["parameter"] == "starter.thickness" and card["proofs"][0]["gap"] == pytest.approx(0.014)
@@ -88,11 +98,11 @@ def test_an_axis_card_holds_all_the_evidence(tmp_path, capsys):
         (("axis=diagonal", "belief_n=51"), "belief_n = 51; it must be from 0 to n = 50"),
         (("axis=diagonal", "any_n=-1"), "any_n = -1; it must be from 0 to n = 50"),
         (("axis=diagonal", "n=10", "certify_n=20"), "certify_n = 20; it must be from 0 to n = 10"),
-        ((), "probe needs axis=..."),
+        ((), "axis card needs axis=..."),
     ],
 )
 def test_bad_input_is_told_in_one_line(argv, says, capsys, tmp_path):
-    status = cli.run(("probe", "task=domino_single", f"to={tmp_path}", *argv))
+    status = cli.run(("axis", "card", "task=domino_single", f"to={tmp_path}", *argv))
     told = capsys.readouterr().err
     assert status == 2 and says in told and told.count("\n") == 1
 

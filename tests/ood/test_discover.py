@@ -265,14 +265,14 @@ def test_real_trials_tell_a_memory_that_holds_from_one_that_breaks(tmp_path):
     ],
 )
 def test_bad_input_is_told_in_one_line(argv, says, capsys, tmp_path):
-    status = cli.run(("discover", "task=domino_single", f"to={tmp_path}", *argv))
+    status = cli.run(("axis", "discover", "task=domino_single", f"to={tmp_path}", *argv))
     told = capsys.readouterr().err
     assert status == 2 and says in told and told.count("\n") == 1
 
 
 def test_a_missing_forest_is_told_before_any_work(capsys, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
-    assert cli.run(("discover", "task=domino_single", f"to={tmp_path / 'found'}")) == 2
+    assert cli.run(("axis", "discover", "task=domino_single", f"to={tmp_path / 'found'}")) == 2
     told = capsys.readouterr().err
     assert "say pip install 'scengen[discover]', or method=hypercube" in told and told.count("\n") == 1
     assert not (tmp_path / "found").exists()

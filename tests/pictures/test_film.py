@@ -155,7 +155,7 @@ def test_a_video_lasts_as_long_as_the_witness(row, tmp_path):
     import av
 
     target = tmp_path / "sub" / "film.mp4"
-    arguments = ["film", f"pool={REFERENCE}", f"id={row.id}", f"to={target}", "fps=2", "width=64", "height=48"]
+    arguments = ["show", "film", f"pool={REFERENCE}", f"id={row.id}", f"to={target}", "fps=2", "width=64", "height=48"]
     assert cli.run([*arguments, "camera=rgb_gripper_cam"]) == 0
     with av.open(str(target)) as file:
         times = [float(frame.time) for frame in file.decode(video=0)]
@@ -165,7 +165,16 @@ def test_a_video_lasts_as_long_as_the_witness(row, tmp_path):
 @drawing
 def test_a_shortcut_is_filmed_and_its_end_is_told(row, tmp_path, capsys):
     target = tmp_path / "film.png"
-    arguments = ["film", f"pool={REFERENCE}", f"id={row.id}", f"to={target}", "frames=2", "width=64", "height=48"]
+    arguments = [
+        "show",
+        "film",
+        f"pool={REFERENCE}",
+        f"id={row.id}",
+        f"to={target}",
+        "frames=2",
+        "width=64",
+        "height=48",
+    ]
     assert cli.run([*arguments, "of=push_the_slab"]) == 0
     assert "push_the_slab: failure" in capsys.readouterr().out
     assert Image.open(target).size == (128, 48)
@@ -208,7 +217,7 @@ def test_without_a_display_the_viewer_says_so(row, monkeypatch, capsys):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setattr("sys.platform", "linux")
-    assert cli.run(["view", f"pool={REFERENCE}", f"id={row.id}"]) == 2
+    assert cli.run(["show", "view", f"pool={REFERENCE}", f"id={row.id}"]) == 2
     err = capsys.readouterr().err
     assert "no display to open a window on" in err and err.count("\n") == 1
 
@@ -218,6 +227,7 @@ def test_the_viewer_plays_the_witness_until_the_window_is_closed(row, scenario, 
     window = Window(len(row.witness) - 50)
     monkeypatch.setattr("mujoco.viewer.launch_passive", window.open)
     monkeypatch.setattr("time.sleep", lambda _: None)
+    monkeypatch.setenv("DISPLAY", ":0")
     view(row, scenario, replay=True)
     assert window.shown == window.periods and scenario.success(window.world)
 
@@ -260,7 +270,7 @@ class Window:
     ],
 )
 def test_bad_input_is_one_line(row, capsys, arguments, says):
-    assert cli.run(["film", f"pool={REFERENCE}", f"id={row.id}", *arguments]) == 2
+    assert cli.run(["show", "film", f"pool={REFERENCE}", f"id={row.id}", *arguments]) == 2
     err = capsys.readouterr().err
     assert says in err and err.count("\n") == 1
 
@@ -275,6 +285,6 @@ def test_bad_input_is_one_line(row, capsys, arguments, says):
     ],
 )
 def test_bad_input_that_needs_a_camera_is_one_line(row, capsys, arguments, says):
-    assert cli.run(["film", f"pool={REFERENCE}", f"id={row.id}", *arguments]) == 2
+    assert cli.run(["show", "film", f"pool={REFERENCE}", f"id={row.id}", *arguments]) == 2
     err = capsys.readouterr().err
     assert says in err and err.count("\n") == 1

@@ -8,7 +8,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from helpers import REFERENCE, pictures_are_possible
+from helpers import REFERENCE, needs_robosuite, pictures_are_possible
 
 from scengen import cli
 from scengen.envs.gym import PoolEnv
@@ -130,7 +130,7 @@ other.reset()
 @pytest.mark.slow
 def test_a_script_that_closes_nothing_ends_without_an_error(script):
     if UNCLOSED_ROBOSUITE in script:
-        pytest.importorskip("robosuite", reason="no robosuite; it is an extra")
+        needs_robosuite()
     line = [sys.executable, "-c", script.format(pool=str(REFERENCE))]
     ended = subprocess.run(line, capture_output=True, text=True)
     assert ended.returncode == 0 and "Error" not in ended.stderr and "Traceback" not in ended.stderr, ended.stderr

@@ -8,6 +8,7 @@ from readme.commands import APART, PAGES, ROOT, commands, why_apart
 from readme.run import run
 
 from scengen import cli, compose
+from scengen.cli.verbs import parsed
 
 LINES = [
     line
@@ -24,7 +25,7 @@ def test_what_is_left_out_is_there():
 
 @pytest.mark.parametrize("line", LINES)
 def test_every_setting_of_a_command_exists(line, monkeypatch):
-    _, verb, *words = shlex.split(line, comments=True)
+    verb, words = parsed(tuple(shlex.split(line, comments=True)[1:]))
     assert verb in cli.VERBS or verb == "--completion"
     if verb in cli.VERBS:
         overrides = [word for word in words if not word.startswith("-")]

@@ -22,7 +22,7 @@ from pads import Domino
 from studios import running
 
 from scengen import cli, compose, load_task
-from scengen.cli.commands.teleop import source_of_pool
+from scengen.cli.commands.demos_pad import source_of_pool
 from scengen.demos.teleop.collect import Source, TeleopSettings
 from scengen.demos.teleop.eye import POLICY_CAMERA
 from scengen.demos.teleop.pad import PadEvent

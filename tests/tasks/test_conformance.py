@@ -1,4 +1,4 @@
-"""Every task keeps to the rules, on every split; `make slow` also certifies the first training scenario of each.
+"""Every task keeps to the rules, on every split; `make long` also certifies the first training scenario of each.
 
 `make certify` certifies scenarios of all splits; the rules themselves are tested in `test_foreign_task.py`.
 """
@@ -7,9 +7,8 @@ import pytest
 
 from scengen import conformance, list_tasks
 
-EACH_CHANGE = [pytest.mark.slow(each_change=True)]
 CHECKS = [
-    pytest.param(check, id=f"{task}-{check}", marks=EACH_CHANGE if "certified" in str(check) else [])
+    pytest.param(check, id=f"{task}-{check}")
     for task in list_tasks()
     for check in conformance.checks(task, scenarios=1, certified=("id",))
 ]

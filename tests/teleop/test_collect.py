@@ -21,7 +21,7 @@ from scengen.tasks.domino_single import DominoSingle
 def teleop(folder, *given, **changed):
     """Drive `domino_single` with a program; return the exit status."""
     asked = {"task": "domino_single", "device": "pads:Domino", "n": 3, "operator": "op7", **changed, "to": folder}
-    return cli.run(["teleop", *(f"{name}={value}" for name, value in asked.items() if value is not None), *given])
+    return cli.run(["demos", "pad", *(f"{name}={value}" for name, value in asked.items() if value is not None), *given])
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_driven_verified_recorded_curated(made, tmp_path, capsys):
     assert table["scengen/operator"].to_pylist() == ["op7"] * 3
     assert cli.run(["curate", f"data={data}"]) == OK
     assert json.loads((data / "curation" / "kept.json").read_text()) == [0, 1, 2]
-    assert cli.run(["stats", f"data={data}"]) == OK
+    assert cli.run(["curate", "stats", f"data={data}"]) == OK
 
 
 @pytest.mark.slow
@@ -172,7 +172,7 @@ def test_a_manifest_with_another_operator_than_a_code_is_refused(mine, operator,
         ({"device": "no_module:Pad"}, "device = no_module:Pad; there is no module 'no_module' on the path"),
         ({"device": "pads:Nobody"}, "device = pads:Nobody; pads has no function or class named 'Nobody'"),
         ({"device": "pads:Hands", "n": 1}, "its method read fails (NotImplementedError: ); the fault is the device's"),
-        ({"task": None}, "teleop needs either task=NAME or pool=FOLDER"),
+        ({"task": None}, "demos pad needs either task=NAME or pool=FOLDER"),
         ({"id": "8ed4"}, "id = 8ed4 names a scenario of a pool; give pool=FOLDER, or index= with task="),
         ({"takes": 0}, "takes = 0; it must lie in [1, 1000]"),
         ({"view": "true"}, "view = true, but there is no display"),

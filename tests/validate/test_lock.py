@@ -11,9 +11,9 @@ from pools import QUICKLY, make
 
 from scengen import cli, list_tasks, load_task
 from scengen.errors import PoolError
+from scengen.installation import versions
 from scengen.pool import Pool
 from scengen.validate import identity, lock
-from scengen.versions import versions
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ from ...pool import Pool
 from ...samplers.task_files import search_path
 from ...work.extras import module_of_extra
 from . import OK, Arguments, one, say, several
+from .demos_pad import source_of_pool
 from .settings import read
-from .teleop import source_of_pool
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 """Addresses that only this machine reaches."""

@@ -29,8 +29,8 @@ from ...work.limits import at_least
 from ...work.targets import try_file
 from ...work.typed import typed
 from . import FAILED, OK, Arguments, chosen, err, holder, remark, say, write
-from .film import check_format
 from .settings import read, task_overrides
+from .show_film import check_format
 
 ORACLE = "oracle"
 """Value of `what` for the oracle without jitter."""

@@ -37,7 +37,7 @@ MAX_LOST = 100
 
 @dataclass(frozen=True)
 class TeleopSettings:
-    """Settings of `scengen teleop`; conf/command/teleop.yaml explains them."""
+    """Settings of `scengen demos pad`; conf/command/demos_pad.yaml explains them."""
 
     pool: str | None = None
     id: str | None = None

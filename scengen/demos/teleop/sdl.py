@@ -183,7 +183,7 @@ class Window:
         pygame.font.init()
         self._font, self._height = pygame.font.Font(None, 18), height
         self._surface = pygame.display.set_mode((width, height + LINE_HEIGHT))
-        pygame.display.set_caption("scengen teleop")
+        pygame.display.set_caption("scengen demos pad")
 
     @property
     def drawn(self) -> int:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import BadConfig
+from ...robots.files import INSTALL
 from ..dataset import Recording
 from ..streams import ENVIRONMENT
 from .settings import EPISODES, SMOKE_BATCHES, RecipeSettings, Scripts, script
@@ -185,10 +186,11 @@ def _check(order: Order) -> None:
 
 def _requirements(order: Order) -> str:
     return (
-        f"# {order.settings.train}: Python 3.12 or newer, in an environment of its own, without robosuite\n"
+        f"# {order.settings.train}: Python 3.12 or newer, in an environment without robosuite's requirements\n"
         f"lerobot[{order.recipe.extras}]=={LEROBOT}\n"
         "scengen\n"
-        "# From a checkout of scengen, for lerobot-eval: pip install integrations/lerobot_env_scengen\n"
+        f"# For lerobot-eval, the robot's files: {INSTALL}\n"
+        "# and, from a checkout of scengen: pip install integrations/lerobot_env_scengen\n"
     )
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from ...compose import load_task
 from ...envs import robomimic as keys
 from ...errors import BadConfig, PoolError, ScengenError, cut
+from ...robots.files import INSTALL
 from ..hdf5 import check_target
 from .settings import EPISODES, SMOKE_BATCHES, RecipeSettings, Scripts, script
 
@@ -212,7 +213,8 @@ def _requirements() -> str:
     return (
         f"# {NAME}: Python 3.11 or newer, in an environment of its own. cmake builds its requirement egl_probe.\n"
         f"robomimic=={ROBOMIMIC}\nscengen\n"
-        "# From a checkout of scengen, to play checkpoints: pip install integrations/robomimic_scengen\n"
+        f"# To play checkpoints, the robot's files: {INSTALL}\n"
+        "# and, from a checkout of scengen: pip install integrations/robomimic_scengen\n"
     )
 
 

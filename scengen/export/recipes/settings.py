@@ -1,4 +1,4 @@
-"""Settings of `scengen recipe`, and what a recipe gives back."""
+"""Settings of `scengen export recipe`, and what a recipe gives back."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ SMOKE_BATCHES = 20
 
 @dataclass(frozen=True)
 class RecipeSettings:
-    """Settings of `scengen recipe`; conf/command/recipe.yaml explains them."""
+    """Settings of `scengen export recipe`; conf/command/export_recipe.yaml explains them."""
 
     train: str = ""
     data: str = ""

@@ -86,7 +86,7 @@ def _axis(known: Sequence[Region], box: RegionBox, why: str) -> Axis:
     name = "_and_".join(known[i].name for i in box.regions)
     first = known[box.regions[0]]
     graded = len(box.ranges) == 1 and first.beyond and not first.parameter.integer
-    return Axis(name, why, "scengen discover", moved, 5 if graded else 0)
+    return Axis(name, why, "scengen axis discover", moved, 5 if graded else 0)
 
 
 def distribution(region: Region, low: float, high: float) -> Dist:
@@ -120,7 +120,7 @@ def as_yaml(task: Task, findings: Sequence[Finding], spent: Mapping[str, int]) -
     told = ", ".join(f"{count} {what}" for what, count in spent.items())
     axes = {one.axis.name: _entry(one.axis) for one in findings}
     found = yaml.safe_dump({"axes": axes}, sort_keys=False, default_flow_style=None, width=120)
-    return f"# Axes of {task.name} found by scengen discover: {told}\n{found}"
+    return f"# Axes of {task.name} found by scengen axis discover: {told}\n{found}"
 
 
 def _entry(axis: Axis) -> dict[str, Any]:

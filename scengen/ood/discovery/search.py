@@ -89,7 +89,7 @@ MIN_EVIDENCE = 3
 
 @dataclass(frozen=True)
 class DiscoverSettings:
-    """Settings of `scengen discover`; conf/command/discover.yaml explains them."""
+    """Settings of `scengen axis discover`; conf/command/axis_discover.yaml explains them."""
 
     budget: int = 500
     method: str = FOREST

@@ -7,9 +7,9 @@ from typing import Any
 
 from ...certificate import CHECKS
 from ...errors import PoolError, cut
+from ...installation import versions
 from ...pool.manifest import MANIFEST
 from ...samplers.task import Task
-from ...versions import versions
 from ...work.fingerprint import fingerprint
 from .. import lock
 from ..settings import CertifySettings
