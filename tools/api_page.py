@@ -41,6 +41,7 @@ MODULES = {
     "Checks and tests": ("conformance.rules", "conformance.frames", "errors"),
     "The base of assets": ("assets.prop",),
     "Pools and environments": ("pool.pool", "pool.rows", "envs.gym", "envs.lerobot"),
+    "Pictures": ("pictures.film",),
 }
 """Modules on the page, by heading. `scengen asset` lists the assets themselves."""
 MAX_VALUE_LENGTH = 80

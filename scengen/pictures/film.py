@@ -1,5 +1,6 @@
 """Films: recorded actions replayed in front of a camera, as a strip of pictures or as a video."""
 
+import io
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ from ..sim.world import World
 from ..validate.playable import stored_world
 from ..validate.rollout import Rollout, try_shortcut
 from ..work.targets import appearing
-from .render import Camera, Picture, check_pictures
+from .render import Camera, Picture, address, check_pictures
 from .video import Movie
 
 WITNESS = "witness"
@@ -156,18 +157,62 @@ def movie(
         UnknownName: there is no such camera.
         BadConfig: the file cannot be written.
     """
-    periods = range(0, len(take.actions) + 1, periods_between(fps))
+    periods_between(fps)  # before a file is begun
     with (
         closing(Camera(take.world(), width, height)) as eye,
         appearing(path, folder=False) as part,
         Movie(part, fps, width, height) as film,
     ):
-        if camera is None:
-            eye.look([eye.world.state() for _ in take.moments(eye.world, take.even(LOOKS))])
-        for _ in take.moments(eye.world, periods):
-            film.add(eye.take(camera))
-            progress(film.frames, len(periods))
+        for picture in _frames(take, eye, fps, camera, progress):
+            film.add(picture)
         return film.frames
+
+
+@dataclass(frozen=True)
+class InlineFilm:
+    """A film in memory, which notebooks show."""
+
+    content: bytes
+    """Animated WebP, which repeats."""
+
+    def _repr_html_(self) -> str:
+        return f'<img src="{address(self.content, "webp")}" alt="film of a rollout">'
+
+
+def inline(
+    take: Take,
+    fps: int = 10,
+    width: int = 320,
+    height: int = 240,
+    camera: str | None = None,
+    progress: Progress = lambda done, total: None,
+) -> InlineFilm:
+    """A film in real time for a notebook, which shows it if it is the last line of a cell. It needs no video codec.
+
+    Args:
+        fps: frames per second, a divisor of the control rate of 100 Hz.
+        camera, progress: as for `strip`.
+
+    Raises:
+        NoPictures: OpenGL is missing.
+        UnknownName: there is no such camera.
+    """
+    with closing(Camera(take.world(), width, height)) as eye:
+        first, *others = map(Image.fromarray, _frames(take, eye, fps, camera, progress))
+    buffer = io.BytesIO()
+    milliseconds = round(1000 * Loop.PERIOD * periods_between(fps))
+    first.save(buffer, "webp", save_all=True, append_images=others, duration=milliseconds, loop=0, quality=80)
+    return InlineFilm(buffer.getvalue())
+
+
+def _frames(take: Take, eye: Camera, fps: int, camera: str | None, progress: Progress) -> Iterator[Picture]:
+    """Pictures of a take, `fps` per second."""
+    periods = range(0, len(take.actions) + 1, periods_between(fps))
+    if camera is None:
+        eye.look([eye.world.state() for _ in take.moments(eye.world, take.even(LOOKS))])
+    for number, _ in enumerate(take.moments(eye.world, periods), 1):
+        yield eye.take(camera)
+        progress(number, len(periods))
 
 
 def periods_between(fps: int) -> int:

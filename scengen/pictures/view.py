@@ -29,7 +29,12 @@ def check_display() -> None:
 
 
 def view(row: PoolRow, scenario: Scenario, replay: bool) -> None:
-    """Show a scenario in real time until the window is closed. After the witness, or without it, the robot is idle."""
+    """Show a scenario in real time until the window is closed. After the witness, or without it, the robot is idle.
+
+    Raises:
+        NoDisplay: there is no display for a window.
+    """
+    check_display()
     world = Take.witness(row, scenario).world()
     hide_hulls(world.model)
     episode, actions = Episode(scenario, world), row.witness if replay else []

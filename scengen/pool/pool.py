@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from .. import html_tables
 from ..errors import PoolError
 from .manifest import MANIFEST, Manifest
 from .row import PoolRow
@@ -30,6 +31,13 @@ class Pool(StoredRows[Manifest, PoolRow]):
             PoolError: there is no finished pool of a known format.
         """
         return cls(Path(folder), Manifest.read(Path(folder)))
+
+    def _repr_html_(self) -> str:
+        """Its first scenarios, in a notebook."""
+        values = ("params", "parameters") if self.split == "id" else ("shifted", "changed by the axis")
+        title = f"{self.folder}: {len(self)} certified scenarios of {self.task}/{self.split}"
+        rows = self.columns("index", "id", values[0])
+        return html_tables.table(title, ("index", "id", values[1]), rows, len(self))
 
     def rejects(self) -> Iterator[PoolRow]:
         """Scenarios that were kept although they were not certified (`keep=`), in the order of their indices.

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
+from .. import html_tables
 from ..assets.mesh_prop import MeshProp
 from ..assets.ycb import Scan, Ycb, by_name
 from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
@@ -71,6 +72,15 @@ class Draw:
     """Values of the parameters that the split's axes name."""
     rejected: Mapping[str, int]
     """Number of earlier infeasible tries, by reason."""
+
+    def _repr_html_(self) -> str:
+        """Its parameters that vary, in a notebook, those of the axes first."""
+        every = {p.name: p for p in parameters(self.scenario)}
+        varied = [every[name] for name in every if name in self.quantiles and name not in self.shifted]
+        rows = [(p.name, p.nominal, p.unit, p.name in self.shifted) for p in map(every.get, self.shifted) if p]
+        rows += [(p.name, p.nominal, p.unit, False) for p in varied]
+        title = f"{self.task}/{self.split}@{self.index}/{self.scenario.id}, training twin {self.id_twin}"
+        return html_tables.table(title, ("parameter", "value", "unit", "changed by the axis"), rows, len(rows))
 
 
 @dataclass(frozen=True)

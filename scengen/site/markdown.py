@@ -18,7 +18,8 @@ PAGES = (
     "CHANGELOG.md",
     "docs/*.md",
     "docs/*/*.md",
-    "example/README.md",
+    "examples/README.md",
+    "task_template/README.md",
     "integrations/*/README.md",
 )
 """Pages of a repository."""
@@ -28,6 +29,8 @@ FILES = (
     "docs/*.svg",
     "docs/*/*.jpg",
     "docs/*/*.png",
+    "examples/*.py",
+    "examples/*.ipynb",
     "LICENSE",
     "CITATION.cff",
     "Dockerfile",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.special import betaincinv
 
+from .. import html_tables
 from ..certificate import CHECKS, NOT_CHECKED, Certificate, Check
 from ..control.loop import Loop
 from ..episode import Actions, Episode
@@ -34,6 +35,13 @@ class Certified:
     witness: Actions
     digest: str
     """Hash of the physics state at the end of the witness."""
+
+    def _repr_html_(self) -> str:
+        """Its checks, in a notebook."""
+        results = {True: "passed", False: "failed", None: "not checked"}
+        rows = [(c.name, results[c.passed], c.reason, html_tables.plain(c.numbers)) for c in self.certificate.checks]
+        title = f"{self.certificate.verdict}, witness of {len(self.witness)} actions"
+        return html_tables.table(title, ("check", "result", "reason", "numbers"), rows, len(rows))
 
 
 def certify(

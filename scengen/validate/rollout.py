@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import html_tables
 from ..control.loop import ACTION, Loop
 from ..control.teleop import MOTION, unfiltered
 from ..episode import STRICT, Actions, Episode, Outcome, Rules
@@ -48,6 +49,12 @@ class Rollout:
     @property
     def solved(self) -> bool:
         return self.outcome == "success"
+
+    def _repr_html_(self) -> str:
+        """Its result, in a notebook."""
+        head = ("outcome", "reason", "time [s]", "actions", "the plan gave up", "final state")
+        row = (self.outcome, self.reason, self.seconds, len(self.actions), self.gave_up, self.digest)
+        return html_tables.table("Rollout", head, [row])
 
 
 @dataclass(frozen=True)

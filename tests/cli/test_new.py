@@ -15,13 +15,13 @@ from scengen.cli.commands import new
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """The folder of a package with names that are not those of the example."""
+    """The folder of a package with names that are not those of the template."""
     folder = tmp_path_factory.mktemp("new") / "lab"
     assert cli.run(("new", "task=slide_home", "package=lab_tasks", f"to={folder}")) == 0
     return folder
 
 
-def test_every_name_of_the_example_is_replaced(written):
+def test_every_name_of_the_template_is_replaced(written):
     files = {str(p.relative_to(written)): p.read_text() for p in written.rglob("*") if p.is_file()}
     assert files.keys() == {
         "README.md",

@@ -227,6 +227,7 @@ def test_the_viewer_plays_the_witness_until_the_window_is_closed(row, scenario, 
     window = Window(len(row.witness) - 50)
     monkeypatch.setattr("mujoco.viewer.launch_passive", window.open)
     monkeypatch.setattr("time.sleep", lambda _: None)
+    monkeypatch.setenv("DISPLAY", ":0")
     view(row, scenario, replay=True)
     assert window.shown == window.periods and scenario.success(window.world)
 

@@ -12,7 +12,7 @@ from scengen.cli.verbs import parsed
 
 LINES = [
     line
-    for line in commands(*PAGES, ROOT / "docs" / "axis.md", ROOT / "example" / "README.md")
+    for line in commands(*PAGES, ROOT / "docs" / "axis.md", ROOT / "task_template" / "README.md")
     if line.startswith("scengen ") and "/path/to/" not in line  # tests/cli/test_own_axis.py has these with a folder
 ]
 
@@ -30,9 +30,9 @@ def test_every_setting_of_a_command_exists(line, monkeypatch):
     if verb in cli.VERBS:
         overrides = [word for word in words if not word.startswith("-")]
         overrides = [word for word in overrides if word not in ("job", "defaults-tree")]
-        if "task=push_off" in overrides and verb != "new":  # the task of the example, which is not installed
-            monkeypatch.syspath_prepend(ROOT / "example")
-            overrides.insert(0, f"hydra.searchpath=[file://{ROOT}/example/my_tasks/conf]")
+        if "task=push_off" in overrides and verb != "new":  # the task of the template, which is not installed
+            monkeypatch.syspath_prepend(ROOT / "task_template")
+            overrides.insert(0, f"hydra.searchpath=[file://{ROOT}/task_template/my_tasks/conf]")
         for one in compose.combinations(verb, overrides) if verb in ("generate", "demos") else [overrides]:
             compose.as_yaml(verb, getattr(one, "overrides", one))
 

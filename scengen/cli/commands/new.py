@@ -15,10 +15,12 @@ from ...work.targets import try_folder, write
 from . import OK, Arguments, say
 from .settings import read
 
+TEMPLATE = "task_template"
+"""Folder that comes with scengen and is copied."""
 TASK = "push_off"
-"""Name of the task in the example that is copied."""
+"""Name of the task in the template that is copied."""
 PACKAGE = "my_tasks"
-"""Name of the package in the example that is copied."""
+"""Name of the package in the template that is copied."""
 MAX_NAME = 60
 """Largest length of a name [characters]: a part of a path may have at most 255 bytes."""
 RESERVED = {"task": ("conf",), "package": ("conf", "scengen", "test", "tests")}
@@ -54,20 +56,20 @@ def command(arguments: Arguments) -> int:
     if folder.is_dir() and any(folder.iterdir()):
         raise BadConfig(f"{cut(str(folder))} is not empty; give a new folder as to=FOLDER")
     names = _names(settings.task, settings.package)
-    example = shipped("example")
-    for path in sorted(example.rglob("*")):
+    template = shipped(TEMPLATE)
+    for path in sorted(template.rglob("*")):
         if path.is_file() and path.suffix in SUFFIXES:
-            write(folder / _renamed(str(path.relative_to(example)), names), _renamed(path.read_text(), names))
+            write(folder / _renamed(str(path.relative_to(template)), names), _renamed(path.read_text(), names))
     say(f"wrote the package {settings.package} with the task {settings.task}; continue with {folder / 'README.md'}")
     return OK
 
 
 SUFFIXES = (".md", ".py", ".toml", ".yaml")
-"""Suffixes of the files of the example. Files of Python and test tools beside them are not copied."""
+"""Suffixes of the files of the template. Files of Python and test tools beside them are not copied."""
 
 
 def _names(task: str, package: str) -> dict[str, str]:
-    """New names for those of the example, in each spelling that the example uses."""
+    """New names for those of the template, in each spelling that the template uses."""
     return {
         TASK: task,
         _hyphenated(TASK): _hyphenated(task),
