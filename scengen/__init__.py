@@ -59,7 +59,7 @@ _HOME = {
     "Task": ("samplers.task", "Task"),
     "World": ("sim.world", "World"),
     "certify": ("validate.certify", "certify"),
-    "list_tasks": ("task_files", "tasks"),
+    "list_tasks": ("samplers.task_files", "tasks"),
     "load_task": ("compose", "load_task"),
     "param": ("params", "param"),
     "replay": ("validate.rollout", "replay"),
