@@ -69,7 +69,7 @@ def fills() -> dict[str, str]:
     certified = {task: ledger.latest("certified", task) for task in list_tasks()}
     rows = _axes(certified)
     training = [
-        [f"[{task}](tasks/{task}.md)", *_certification(task, found.get(ID)), _cpu(task, found.get(ID))]
+        [f"[{task}](tasks/{task}.md)", *certification(task, found.get(ID)), _cpu(task, found.get(ID))]
         for task, found in certified.items()
     ]
     rejected = [
@@ -132,7 +132,7 @@ def _row(
         cells[BASELINES.index("hidden_belief")] = "nothing hidden"
     judged = verdict(found.values()) if found else none
     return [
-        *(task.name, axis, outside, physics, *_certification(task.name, certified), judged, *cells),
+        *(task.name, axis, outside, physics, *certification(task.name, certified), judged, *cells),
         *(_learner(task.name, found), replay_ends, oracle_ends, energy),
     ]
 
@@ -144,7 +144,7 @@ def _learner(task: str, found: Mapping[str, Baseline]) -> str:
     return f"{best.name}: {_baseline(best)}" if best else predictors.cell(task, found)
 
 
-def _certification(task: str, row: Evidence | None) -> list[str]:
+def certification(task: str, row: Evidence | None) -> list[str]:
     """The figures of certification of a split. Earlier rows have no draws for the oracle, or no replays."""
     if row is None:
         return [ledger.not_measured(task)] * len(CERTIFIED)

@@ -61,7 +61,7 @@ def plots() -> dict[str, bytes]:
 
 
 def means(task: str) -> dict[str, tuple[float, float]]:
-    """Mean percentages that each policy solves in training and on the axes of a task; nothing if one is not measured."""
+    """Mean percentages that each policy solves in training and on the axes; nothing if one has not played the task."""
     rates, axes = _rates().get(task, {}), load_task(task).axes
     return {
         name: (float(np.mean(own[ID])), float(np.mean([np.mean(own[axis]) for axis in axes])))
