@@ -7,6 +7,7 @@ tools/baselines.py.
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import axis_records
@@ -67,7 +68,7 @@ def main(*arguments: str) -> None:
 def fills() -> dict[str, str]:
     """The tables of docs/axes.md."""
     certified = {task: ledger.latest("certified", task) for task in list_tasks()}
-    rows = _axes(certified)
+    rows = _axes(list_tasks())
     training = [
         [f"[{task}](tasks/{task}.md)", *certification(task, found.get(ID)), _cpu(task, found.get(ID))]
         for task, found in certified.items()
@@ -88,19 +89,22 @@ def fills() -> dict[str, str]:
     }
 
 
-def of_task(task: Task) -> dict[str, dict[str, str]]:
+def of_task(task: str) -> dict[str, dict[str, str]]:
     """The cells of the axes of a task by title."""
-    certified = {task.name: ledger.latest("certified", task.name)}
-    return {row[1]: dict(zip(COLUMNS[2:], row[2:], strict=True)) for row in _axes(certified, [task.name])}
+    return {row[1]: dict(zip(COLUMNS[2:], row[2:], strict=True)) for row in _axes([task])}
 
 
-def _axes(certified: Mapping[str, Mapping[str, Evidence]], tasks: Sequence[str] = ()) -> list[list[str]]:
-    """The cells of each axis of all tasks, or of some, in the order of the task files."""
-    rows = []
-    for task in map(load_task, tasks or list_tasks()):
-        cards, found = axis_records.cards(task), axis_records.baselines(task)
-        rows += [_row(task, axis, cards.get(axis), found[axis], certified[task.name].get(axis)) for axis in task.axes]
-    return rows
+def _axes(tasks: Iterable[str]) -> list[list[str]]:
+    """The cells of each axis of some tasks, in the order of the task files."""
+    return [row for task in tasks for row in _rows(task)]
+
+
+@cache
+def _rows(name: str) -> list[list[str]]:
+    """The cells of each axis of a task."""
+    task = load_task(name)
+    certified, cards, found = ledger.latest("certified", name), axis_records.cards(task), axis_records.baselines(task)
+    return [_row(task, axis, cards.get(axis), found[axis], certified.get(axis)) for axis in task.axes]
 
 
 def _verdicts(rows: Sequence[Sequence[str]]) -> str:

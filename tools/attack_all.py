@@ -80,17 +80,17 @@ def attacked(task: Task, budget: int, rules: str, workers: str) -> int:
 
 def fills() -> dict[str, str]:
     """The tables of docs/attacks.md."""
-    reports = _reports(STRICT)
-    hours = sum(report["cpu"] for report in reports.values()) / 3600
-    told = f"The rollouts of {len(reports)} tasks took {hours:.1f} hours of one core."
-    for missing in sorted({*list_tasks()} - {*reports}):
+    found = reports()
+    hours = sum(report["cpu"] for report in found.values()) / 3600
+    told = f"The rollouts of {len(found)} tasks took {hours:.1f} hours of one core."
+    for missing in sorted({*list_tasks()} - {*found}):
         told += f" `{missing}`: {ledger.not_measured(missing)}."
-    return {"attacks": f"{told}\n\n{_table(reports)}", "leaks": _leaks(), "paper": _table(_reports(PAPER))}
+    return {"attacks": f"{told}\n\n{_table(found)}", "leaks": _leaks(), "paper": _table(reports(PAPER))}
 
 
 def of_task(task: str) -> dict[str, str]:
     """The cells of a task by title; nothing if it was not attacked."""
-    report = _reports(STRICT).get(task)
+    report = reports().get(task)
     return dict(zip(COLUMNS[1:], _cells(report), strict=True)) if report else {}
 
 
@@ -111,7 +111,7 @@ def _leaks() -> str:
     return text + ("\n" if told else "")
 
 
-def _reports(rules: str) -> dict[str, Mapping[str, Any]]:
+def reports(rules: str = STRICT) -> dict[str, Mapping[str, Any]]:
     """The report on each task that was attacked, by the newest grammar of plans and with the most rollouts."""
     known = {task: [row for row in ledger.current("attack", task) if row.has(rules=rules)] for task in list_tasks()}
     newest = {

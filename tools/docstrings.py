@@ -7,6 +7,10 @@ CODE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 """Code in Markdown."""
 SPECIAL = re.compile(r"([*|\\])|(?<=\w)(_)(?!\w)")
 """Characters of plain text that mark something in reStructuredText."""
+SKETCHES = re.compile(r"(?<=\n\n)((?: {4,}\S.*(?:\n|$)|\n(?= {4}))+)")
+"""Indented blocks after an empty line. Entries of `Args` follow their heading without one."""
+SKETCH = re.compile(r" {4,}\S")
+"""Beginning of such a block."""
 BULLET = re.compile(r"^(\s*)\* ")
 LINK = re.compile(r"\[([^\]]+)\]\([^)]+\)")
 """Link of Markdown; it leads to a file of the repository, so that its text alone is kept."""
@@ -21,6 +25,15 @@ def to_rest(app: Any, what: str, name: str, of: Any, options: Any, lines: list[s
 
 def rest(text: str) -> str:
     """A docstring as reStructuredText."""
+    return "\n".join(_block(part) if SKETCH.match(part) else _prose(part) for part in SKETCHES.split(text))
+
+
+def _block(text: str) -> str:
+    """An indented block after a paragraph, such as a sketch or code."""
+    return f"::\n\n{text}\n"
+
+
+def _prose(text: str) -> str:
     lines: list[str] = []
     for line in CODE.sub(lambda code: f"``{' '.join(code[1].split())}``", text).split("\n"):
         bullet = BULLET.match(line)

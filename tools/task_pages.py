@@ -135,7 +135,7 @@ def _axes(task: Task, made: Exhibit | None) -> Iterator[str]:
     """A section for every axis: its distributions, its pictures beside training, and its figures."""
     yield from ("## OOD axes", "")
     pairs = {pair.axis: pair for pair in made.pairs} if made else {}
-    measured = all_axes.of_task(task)
+    measured = all_axes.of_task(task.name)
     for axis in task.axes.values():
         yield from (f"### {axis.name}", "", " ".join(axis.why.split()), "")
         for name, dist in axis.replace.items():
