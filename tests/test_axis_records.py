@@ -20,9 +20,10 @@ def test_each_axis_on_which_card_and_learner_disagree_is_explained():
     told = predictors.fills()["exceptions"]
     assert "not looked into" not in told
     listed = {tuple(line.split(" | ")[:2]) for line in told.splitlines() if line.startswith("| ")}
+    listed -= {("| task", "axis"), ("| ---", "---")}
     explained = {(f"| {task}", axis) for task, axis in predictors.EXCEPTIONS}
     cards = {(f"| {task}", axis) for task, axis in predictors.EXCEPTIONS if axis in axis_records.cards(load_task(task))}
-    assert cards <= listed - {("| task", "axis")} <= explained, "an explanation may wait for a card"
+    assert cards <= listed <= explained, "an explanation may wait for a card"
 
 
 def found(name, training, here, of=8):

@@ -41,9 +41,11 @@ COLUMNS = ("task", "split", "policy", "solved", "rate [%]", "why not")
 
 
 def fills() -> dict[str, str]:
-    """The tables of docs/baselines.md."""
+    """The tables and plots of docs/baselines.md."""
     return {
         "summary": _summary(),
+        "rates": "![Rates of each policy on each axis of each task](baselines_axes.svg)",
+        "plot": "![Learning curves of each task](baselines_curves.svg)",
         "curves": _learning_curves(),
         "styles": _worth(NOMINAL, VARIED),
         "curation": _worth(ALL, RANDOM, CURATED),

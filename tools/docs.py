@@ -187,7 +187,7 @@ def _is_page(path: str) -> bool:
     """Whether a path is a page."""
     if task := re.fullmatch(r"docs/tasks/(\w+)\.md", path):
         return task[1] in list_tasks()
-    return path.endswith(".md") and any(PurePosixPath(path).match(pattern) for pattern in WRITTEN)
+    return (ROOT / path).is_file() and any(PurePosixPath(path).match(pattern) for pattern in WRITTEN)
 
 
 def _update(path: Path, content: bytes) -> None:

@@ -25,7 +25,7 @@ def to_rest(app: Any, what: str, name: str, of: Any, options: Any, lines: list[s
 
 def rest(text: str) -> str:
     """A docstring as reStructuredText."""
-    return "\n".join(_block(part) if SKETCH.match(part) else _prose(part) for part in SKETCHES.split(text))
+    return "".join(_block(part) if SKETCH.match(part) else _prose(part) for part in SKETCHES.split(text))
 
 
 def _block(text: str) -> str:
