@@ -32,6 +32,7 @@ autodoc_preserve_defaults = True
 autodoc_typehints_format = "short"
 maximum_signature_line_length = 100
 toc_object_entries_show_parents = "hide"
+add_module_names = False
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 linkcheck_anchors = False
@@ -40,4 +41,5 @@ linkcheck_timeout = 20
 
 def setup(app):
     """Let docstrings, which are Markdown, be read as reStructuredText."""
-    app.connect("autodoc-process-docstring", docstrings.to_rest, priority=400)  # before napoleon's sections
+    app.connect("autodoc-process-docstring", docstrings.before_napoleon, priority=400)
+    app.connect("autodoc-process-docstring", docstrings.after_napoleon, priority=600)

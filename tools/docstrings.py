@@ -18,9 +18,25 @@ NAMES = re.compile(r"^(\s+)(\*{1,2}\w+|\w+(?:, \*{0,2}\w+)+): ")
 """Beginning of an entry of `Args`, which napoleon reads."""
 
 
-def to_rest(app: Any, what: str, name: str, of: Any, options: Any, lines: list[str]) -> None:
+VALUES = ("attribute", "data", "property")
+"""Kinds of docstrings that napoleon spoils: it takes what stands before a colon for a type."""
+
+
+def before_napoleon(app: Any, what: str, name: str, of: Any, options: Any, lines: list[str]) -> None:
     """Replace the lines of a docstring. An event of Sphinx."""
-    lines[:] = rest("\n".join(lines)).split("\n")
+    text = rest("\n".join(lines))
+    if what in VALUES:
+        _spared[name], text = text, ""
+    lines[:] = text.split("\n")
+
+
+def after_napoleon(app: Any, what: str, name: str, of: Any, options: Any, lines: list[str]) -> None:
+    """Restore what napoleon was not to see. An event of Sphinx."""
+    if what in VALUES:
+        lines[:] = _spared.pop(name, "").split("\n")
+
+
+_spared: dict[str, str] = {}
 
 
 def rest(text: str) -> str:
