@@ -169,10 +169,10 @@ comma := ,
 of_tasks = $(if $(TASKS),task=$(subst $(empty) $(empty),$(comma),$(strip $(TASKS))))
 docs: setup
 	$(if $(FILMS),$(BIN)/scengen site to=build/docs/extra/films $(of_tasks))
-	$(BIN)/python tools/docs.py
+	$(BIN)/python tools/build_docs.py
 
 docs-links: setup
-	$(BIN)/python tools/docs.py linkcheck
+	$(BIN)/python tools/build_docs.py linkcheck
 
 # Writes docs/results.md, the headline figures, from the ledger.
 results: setup

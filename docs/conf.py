@@ -8,8 +8,6 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tools")]
 
 import docstrings  # noqa: E402
 
-import scengen.versions  # noqa: E402
-
 project = "scengen"
 author = copyright = "The scengen authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
@@ -26,7 +24,7 @@ highlight_language = "text"
 myst_heading_anchors = 4
 """Headings get the addresses that GitHub gives them."""
 
-autodoc_default_options = {"members": True, "show-inheritance": True}
+autodoc_default_options = {"members": True}
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 autodoc_typehints_format = "short"

@@ -21,14 +21,15 @@ HEAD = """# Results
 
 <!-- Written by tools/results.py; `make results` -->
 
-One line for each task, on its version of today. *-* says that this version was not measured. The name of a task leads to its page in the built
-documentation (`make docs`), and on GitHub to its picture.
+One line for each task, on its version of today. *-* says that this version was not measured. The name of a task leads
+to its page in the built documentation (`make docs`), and on GitHub to its picture.
 
 * **ID**, **axes**: scenarios certified at level `quick`, of the draws tried in training and on all axes together.
 * **broken**: axes that break what was right in training, of the axes measured ([every split, measured](axes.md)).
-* **policy**: percent of the scenarios that the best trained policy solves in training, and after the arrow on average over the axes
-  ([baselines](baselines.md)).
-* **ways around**: hits of the adversary that bypass the task, of its rollouts, and the one-sided 95 % bound of their rate ([attacks](attacks.md)).
+* **policy**: percent of the scenarios that the best trained policy solves in training, and after the arrow on average
+  over the axes ([baselines](baselines.md)).
+* **ways around**: hits of the adversary that bypass the task, of its rollouts, and the one-sided 95 % bound of their
+  rate ([attacks](attacks.md)).
 * **core s**: processor time of one certified training scenario ([cost of pools](cluster.md#cost)).
 
 """

@@ -71,8 +71,9 @@ def _films(made: Exhibit | None) -> Iterator[str]:
         for clip in made.clips
     )
     yield from ("## Films in three dimensions", "")
-    yield f'<p>Drag to turn, scroll or pinch to come closer: {" · ".join(links)}.</p>'
-    yield f'<iframe class="film" name="film" title="Film" loading="lazy" src="{player}{html.escape(made.clips[0].address)}"></iframe>'
+    yield f"<p>Drag to turn, scroll or pinch to come closer: {' · '.join(links)}.</p>"
+    first = player + html.escape(made.clips[0].address)
+    yield f'<iframe class="film" name="film" title="Film" loading="lazy" src="{first}"></iframe>'
     yield ""
 
 

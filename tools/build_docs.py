@@ -1,9 +1,9 @@
 """Builds the documentation into build/docs/html. `make docs`
 
-    python tools/docs.py [html | linkcheck]
+    python tools/build_docs.py [html | linkcheck]
 
-Hand-written pages come from docs/ and from the READMEs. Generated ones, and the tables of hand-written ones at the marks
-`<!-- generated: NAME -->`, come from the code, the task files and the ledger. Both are written into build/docs/source,
+Hand-written pages come from docs/ and from the READMEs. Generated ones, and the tables of hand-written ones at the
+marks `<!-- generated: NAME -->`, come from the code, the task files and the ledger. Both are written into build/docs/source,
 from which Sphinx (docs/conf.py) makes HTML. If `scengen site` has written build/docs/extra/films, the pages of tasks
 show its films.
 
@@ -118,7 +118,7 @@ def written(path: Path) -> str:
 
 
 def stored(path: str) -> str:
-    """Place of a file of the repository in the source folder: docs/ is its top, and a README is called as its folder."""
+    """Place of a file of the repository in the source folder: docs/ is its top, a README is called as its folder."""
     place = PurePosixPath(path)
     if place.parts[0] == "docs":
         return "/".join(place.parts[1:])
