@@ -3,9 +3,9 @@
     python tools/build_docs.py [html | linkcheck]
 
 Hand-written pages come from docs/ and from the READMEs. Generated ones, and the tables of hand-written ones at the
-marks `<!-- generated: NAME -->`, come from the code, the task files and the ledger. Both are written into build/docs/source,
-from which Sphinx (docs/conf.py) makes HTML. If `scengen site` has written build/docs/extra/films, the pages of tasks
-show its films.
+marks `<!-- generated: NAME -->`, come from the code, the task files and the ledger. Both are written into
+build/docs/source, from which Sphinx (docs/conf.py) makes HTML. If `scengen site` has written build/docs/extra/films, the
+pages of tasks show its films.
 
 Pages keep their addresses relative to the repository until they are stored: a link holds on GitHub and in the build.
 """
@@ -53,7 +53,7 @@ FILLS: Mapping[str, Callable[[], Mapping[str, str]]] = {
 """Functions that return the tables of a page of docs/ by the names of their marks."""
 CONTENTS = ("docs/index.md", "docs/tasks.md", "docs/api.md")
 """Pages whose tables of links are the navigation."""
-MARK = re.compile(r"<!-- generated: (\w+) -->")
+MARK = re.compile(r"<!-- generated: ([a-z_]+) -->")
 REPOSITORY = re.compile(r"<!-- repository -->\n.*?<!-- end -->\n", re.S)
 """Text of a page that only readers of the repository see."""
 LINK = re.compile(r"\]\(([^)\s]+)\)")
