@@ -4,8 +4,8 @@
 
 Hand-written pages come from docs/ and from the READMEs. Generated ones, and the tables of hand-written ones at the
 marks `<!-- generated: NAME -->`, come from the code, the task files and the ledger. Both are written into
-build/docs/source, from which Sphinx (docs/conf.py) makes HTML. If `scengen site` has written build/docs/extra/films, the
-pages of tasks show its films.
+build/docs/source, from which Sphinx (docs/conf.py) makes HTML. If `scengen site` has written build/docs/extra/films,
+the pages of tasks show its films.
 
 Pages keep their addresses relative to the repository until they are stored: a link holds on GitHub and in the build.
 """
