@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations axes beliefs attacks drift baselines curves docs site reference bench clean checker checker-base mutants behaviour behaviour-check
+.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations axes beliefs attacks drift baselines curves docs docs-links results pictures site reference bench clean checker checker-base mutants behaviour behaviour-check
 
 setup: $(READY)
 
@@ -32,7 +32,7 @@ ci:
 	$(MAKE) check
 	$(MAKE) test
 	$(MAKE) slow
-	$(MAKE) --jobs=2 --output-sync=target types readme wheel stack-sample
+	$(MAKE) --jobs=2 --output-sync=target types readme wheel stack-sample docs
 	$(MAKE) certify N=1 SPLITS="$(OOD_SPLITS)" TASKS="$(OOD_TASKS)"
 
 test: setup
@@ -118,65 +118,74 @@ INTEGRATIONS ?=
 integrations: setup
 	$(BIN)/python tools/check_integrations.py $(INTEGRATIONS)
 
-# Makes the card of every axis and docs/axes.md (hours). AXES holds settings of scengen axis card, and names of tasks to select them.
+# Makes the card of every axis (hours). AXES holds settings of scengen axis card, and names of tasks to select them.
 AXES ?= n=50
 axes: setup
 	$(BIN)/python tools/all_axes.py $(AXES)
+	$(BIN)/python tools/results.py
 
-# Plays planners with beliefs of training on TWINS twins of every axis without a record (an hour), and writes docs/axes.md. TASKS=packing
-# selects tasks. An interrupted call is continued.
+# Plays planners with beliefs of training on TWINS twins of every axis without a record (an hour). TASKS=packing selects tasks.
+# An interrupted call is continued.
 TWINS ?= 8
 beliefs: setup
 	$(BIN)/python tools/beliefs.py n=$(TWINS) $(TASKS)
-	$(BIN)/python tools/all_axes.py page
+	$(BIN)/python tools/results.py
 
-# Searches observations for hidden parameters, attacks every task with BUDGET rollouts, and writes docs/attacks.md (an hour). TASKS=packing
-# selects tasks.
+# Searches observations for hidden parameters, and attacks every task with BUDGET rollouts (an hour). TASKS=packing selects tasks.
 BUDGET ?= 500
 attacks: setup
 	$(BIN)/python tools/leaks_all.py $(TASKS)
 	$(BIN)/python tools/attack_all.py $(BUDGET) $(TASKS)
+	$(BIN)/python tools/results.py
 
-# Compares verdicts under several VERSIONS of MuJoCo and writes docs/drift.md (hours). Uses N scenarios of the pools in POOLS and makes
+# Compares verdicts under several VERSIONS of MuJoCo (hours). Uses N scenarios of the pools in POOLS and makes
 # missing ones. TASKS=packing selects tasks. An interrupted comparison is continued. The environments come from the package index.
 POOLS ?= generated/drift
 VERSIONS ?= 3.5.0,4.0.0
 drift: setup
 	$(BIN)/python tools/drift_all.py $(N) $(POOLS) $(VERSIONS) $(TASKS)
 
-# Trains and evaluates small policies and writes docs/baselines.md (about half an hour of processor time for each task). TASKS=packing
+# Trains and evaluates small policies (about half an hour of processor time for each task). TASKS=packing
 # selects tasks. An interrupted call is continued.
 baselines: setup
 	$(BIN)/python tools/baselines.py $(TASKS)
-	$(BIN)/python tools/baselines_page.py
+	$(BIN)/python tools/results.py
 
 # Trains with three seeds on 25 to 100 demonstrations (half an hour for each task), on other styles, and on spoiled, curated and random
-# ones (a quarter of an hour for each task), and with the wrench (mass_sort), for docs/baselines.md. WORKERS=4 trains at once.
+# ones (a quarter of an hour for each task), and with the wrench (mass_sort). WORKERS=4 trains at once.
 WORKERS ?= 1
 curves: setup
 	$(BIN)/python tools/trainings.py curves workers=$(WORKERS) $(TASKS)
 	$(BIN)/python tools/trainings.py styles workers=$(WORKERS) $(TASKS)
 	$(BIN)/python tools/trainings.py curation workers=$(WORKERS) $(TASKS)
 	$(BIN)/python tools/trainings.py wrench workers=$(WORKERS)
-	$(BIN)/python tools/baselines_page.py
 
-# Writes the generated pages of docs/, with pictures (needs OpenGL). TASKS=packing selects task pages.
-docs: setup
-	$(BIN)/python tools/api_page.py
-	$(BIN)/python tools/paper_page.py
-	$(BIN)/python tools/cluster_page.py
-	$(BIN)/python tools/all_axes.py page
-	$(BIN)/python tools/predictors.py
-	$(BIN)/python tools/baselines_page.py
-	$(BIN)/python tools/task_pages.py $(TASKS)
-
-# Writes a web site into SITE: a page for each task with films in three dimensions, and README, docs, axis cards and reports. The first
-# time takes about half an hour of processor time. TASKS=packing makes some tasks. An interrupted call is continued.
-SITE ?= generated/site
+# Builds the documentation into build/docs/html: the pages of docs/, and those that are generated from the code and the ledger. A warning,
+# such as a link that leads nowhere, is an error. FILMS=1 adds films in three dimensions to the pages of tasks (half an hour of processor time
+# for all; TASKS=packing makes some). Films that are up to date are kept. docs-links also tries the links to other hosts.
+FILMS ?=
 empty :=
 comma := ,
+of_tasks = $(if $(TASKS),task=$(subst $(empty) $(empty),$(comma),$(strip $(TASKS))))
+docs: setup
+	$(if $(FILMS),$(BIN)/scengen site to=build/docs/extra/films $(of_tasks))
+	$(BIN)/python tools/build_docs.py
+
+docs-links: setup
+	$(BIN)/python tools/build_docs.py linkcheck
+
+# Writes docs/results.md, the headline figures, from the ledger.
+results: setup
+	$(BIN)/python tools/results.py
+
+# Writes the pictures of docs/tasks and docs/scenes.webp (needs OpenGL). TASKS=packing selects tasks.
+pictures: setup
+	$(BIN)/python tools/task_pictures.py $(TASKS)
+
+# Writes the films alone, as a web site of tasks, into SITE. TASKS=packing makes some tasks. An interrupted call is continued.
+SITE ?= generated/site
 site: setup
-	$(BIN)/scengen site docs=. to=$(SITE) $(if $(TASKS),task=$(subst $(empty) $(empty),$(comma),$(strip $(TASKS))))
+	$(BIN)/scengen site to=$(SITE) $(of_tasks)
 
 # Runs verification, and control checkers that must fail, on about 450 sound, false and hostile pools (15 minutes).
 # CHECKER=robosuite replays the sound ones in robosuite.

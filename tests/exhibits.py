@@ -32,12 +32,12 @@ def made(task, key, text="text"):
     )
 
 
-def site_of(task, to, docs=None, text="text"):
+def site_of(task, to, text="text"):
     """Write the site of a task with plain pictures, and with a text wherever one of a pool is shown."""
     folder, shown = to / "tasks" / task.name, Shown(task)
     folder.mkdir(parents=True)
     for name in ("picture", "strip", "a", "b"):
         Image.new("RGB", (40, 30), "teal").save(folder / f"{name}.webp")
     (folder / exhibit.DESCRIPTION).write_text(json.dumps(asdict(made(task, shown.key, text))))
-    assert build([shown], to, docs).kept == [task.name]
+    assert build([shown], to).kept == [task.name]
     return to

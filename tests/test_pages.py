@@ -1,15 +1,106 @@
-"""Pages that are written from the code and the files of the tasks are up to date, and speak of every task."""
+"""Documentation: links hold in the repository, tables are generated, headline figures are those of the ledger."""
 
-import all_axes
-import cluster_page
-import paper_page
+import importlib
+import re
+
+import build_docs
+import docstrings
 import pytest
+import results
+import task_pages
 
 from scengen import list_tasks
 
+ROOT = build_docs.ROOT
+PAGES = [path for pattern in build_docs.WRITTEN for path in sorted(ROOT.glob(pattern))]
+MOST_WORDS = 30_000
+"""Number of words that docs/ may hold: people write them, and people have to keep them true."""
 
-@pytest.mark.parametrize("tool", [all_axes, cluster_page, paper_page], ids=lambda tool: tool.__name__)
-def test_the_page_is_up_to_date(tool):
-    text = tool.PAGE.read_text()
-    assert text == tool.page(), f"{tool.PAGE.name} is out of date; run python tools/{tool.__name__}.py"
-    assert all(f"[{name}](tasks/{name}.md)" in text for name in list_tasks())
+
+def slugs(path):
+    """Addresses of the headings of a page, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", path.read_text(), flags=re.S | re.M), re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_link_of_the_repository_leads_somewhere(path):
+    wrong = []
+    for link in build_docs.LINK.findall(build_docs.FENCE.sub("", path.read_text())):
+        place, _, part = link.partition("#")
+        target = (path.parent / place).resolve() if place else path
+        known = "://" in link or (target.exists() and (not part or target.suffix != ".md" or part in slugs(target)))
+        wrong += [] if known else [link]
+    assert not wrong
+
+
+def test_people_keep_what_they_can_read():
+    assert sum(len(path.read_text().split()) for path in (ROOT / "docs").rglob("*.md")) <= MOST_WORDS
+
+
+@pytest.mark.slow(each_change=True)  # all tasks are loaded: 19 s
+def test_the_page_of_results_is_that_of_the_ledger():
+    text = results.PAGE.read_text()
+    assert text == results.page(), "docs/results.md is out of date; run make results"
+    assert text.count("\n") <= 300 and all(f"[{name}](tasks/{name}.jpg)" in text for name in list_tasks())
+    assert all((ROOT / "docs" / "tasks" / f"{name}.jpg").is_file() for name in list_tasks())
+
+
+@pytest.mark.parametrize("page", build_docs.FILLS)
+def test_every_mark_of_a_page_is_filled(page):
+    path = ROOT / "docs" / f"{page}.md"
+    marks, fills = build_docs.MARK.findall(path.read_text()), build_docs.FILLS[page]()
+    assert sorted(marks) == sorted(fills) and all(fills.values())
+    text = build_docs.written(path)
+    assert "<!--" not in text and len(text) > len(path.read_text())
+
+
+def test_the_page_of_a_task_tells_everything_about_it():
+    text = task_pages.page("domino_single")
+    for told in ("| `gap_ratio` | tile widths |", "### wide_gaps", "| `push_the_slab` | raw | failure", "refuting"):
+        assert told in text
+    links = [link for link in build_docs.LINK.findall(text) if "://" not in link]
+    assert len(links) > 10 and all((ROOT / "docs" / "tasks" / link).exists() for link in links)
+
+
+def test_links_lead_from_stored_page_to_stored_page():
+    text = "[a](docs/api.md#x) [b](docs/tasks/packing.jpg) ![c](docs/tasks/packing.jpg) [d](LICENSE) [e](https://f.g)\n"
+    code = "```sh\n[h](docs/api.md)\n```"
+    assert build_docs.relocated("README.md", text + code) == (
+        "[a](api.md#x) [b](tasks/packing.md) ![c](tasks/packing.jpg) [d](files/LICENSE) [e](https://f.g)\n" + code
+    )
+    assert build_docs.relocated("docs/tasks/packing.md", "[a](../axes.md) [b](../../CONTRIBUTING.md)") == (
+        "[a](../axes.md) [b](../contributing.md)"
+    )
+    [contents] = build_docs.navigation("docs/tasks.md", "| [`packing`](tasks/packing.jpg) | x |\n| [y](z.md) | w |\n")
+    assert "packing <tasks/packing>\n```" in contents
+
+
+def test_the_navigation_reaches_every_page():
+    reached = {"docs/index.md"}
+    for path in build_docs.CONTENTS:
+        for entry in re.findall(
+            r" <([^>]+)>$", "".join(build_docs.navigation(path, build_docs.written(ROOT / path))), re.M
+        ):
+            reached.add(entry)
+    stored = {build_docs.stored(str(path.relative_to(ROOT))).removesuffix(".md") for path in PAGES} - {"index"}
+    assert stored | {f"tasks/{name}" for name in list_tasks()} <= reached
+
+
+def test_every_public_function_and_class_of_the_api_has_a_docstring():
+    modules = re.findall(r"automodule:: (\S+)", "".join(path.read_text() for path in (ROOT / "docs/api").glob("*.md")))
+    assert len(modules) == len(set(modules)) > 30
+    for name in modules:
+        module = importlib.import_module(name)
+        own = {n: v for n, v in vars(module).items() if callable(v) and getattr(v, "__module__", "") == name}
+        assert module.__doc__ and not [n for n, v in own.items() if not n.startswith("_") and not v.__doc__]
+
+
+def test_docstrings_are_read_as_rest():
+    text = (
+        "What `a\nb` is.\n* one_ *x*\n\n    | sketch |\n    more `raw`\n\nArgs:\n    x: a [link](y.md).\n    *args: b."
+    )
+    assert docstrings.rest(text) == (
+        "What ``a b`` is.\n\n* one\\_ \\*x\\*\n\n::\n\n    | sketch |\n    more `raw`\n\n\n"
+        "Args:\n    x: a link.\n    *args: b."
+    )

@@ -1,13 +1,13 @@
-"""The card of every axis of every task, and docs/axes.md with a line for each. `python tools/all_axes.py n=50 [task]`
+"""The card of every axis of every task, and the tables of docs/axes.md. `python tools/all_axes.py n=50 [task]`
 
-Cards are stored in generated/axes, and what the page shows of them in records/axis. A repeated call continues. `python
-tools/all_axes.py page` only writes the page, from the ledger: these rows, and those of tools/certified.py,
-tools/beliefs.py and tools/baselines.py.
+Cards are stored in generated/axes, and what the page shows of them in records/axis. A repeated call continues. `make
+docs` takes the tables from the ledger: these rows, and those of tools/certified.py, tools/beliefs.py and
+tools/baselines.py.
 """
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from functools import cache
 from typing import Any
 
 import axis_records
@@ -26,63 +26,6 @@ from scengen.samplers.split import ID
 from scengen.samplers.task import Task
 from scengen.validate.certify import lower_bound
 
-PAGE = Path(__file__).parent.parent / "docs" / "axes.md"
-HEAD = """# Every split, measured
-
-Written by `make axes` and `make docs`. Figures count for the version of a task that they were measured on. *Not
-measured on version N* says that there are none yet for the task as it is. The figures of certification are measured by
-`tools/certified.py`:
-
-* **certified**: scenarios certified at level `quick`, of the first draws. The rejected ones are listed at the end.
-* **oracle**: other draws that the oracle solves without jitter, and the one-sided 95 % Clopper-Pearson bound of its
-  success rate.
-* **robosuite**: witnesses with the same verdict in robosuite, of those replayed there.
-* **CPU s**: CPU time per certified scenario, rejected draws included, with all cores of the machine busy.
-
-## Training
-
-{training}
-## Axes
-
-Each line summarizes one axis card (`scengen axis card`) and what else was tried on the axis; each column states its
-sample size. {verdicts}
-
-* **outside**: smallest gap between axis and training over the moved parameters [widths of the training range].
-  **physics**: features declared by the family that leave training (sampled, 300 draws).
-* **verdict**: what the axis breaks of what was right in training, among what was measured: *motion memory* (replay, any
-  replay), *object-centric memory*, *belief*, *learner*; the strongest kind of memory stands for both. *solved by* the
-  first kind that solves most of the axis, if it breaks none; or *inconclusive*. The columns after it show, for each
-  baseline, how many of its control scenarios within training and how many OOD twins it solves, and the excess with its
-  95 % interval. Only twins count that the oracle solves in both arms. `weak`: the baseline solves less than 30 % of its
-  control, and is inconclusive.
-  * **replay**: the actions that solve the training twin. **object-centric**: its path relative to the bodies that the
-    hand goes to, followed by feedback. **any**: one of 16 training solutions, none of them the twin's own. The control
-    is the remembered scenario with the axis' own parameters redrawn within training. For **any**, and if training has
-    one value only (marked *held out*), it is a training scenario that no memory comes from.
-  * **belief**: the oracle of the training twin plays in the OOD twin, with all its feedback, and believes all
-    parameters that the axis moves to be as in training. **hidden belief**: it believes only the hidden ones, if the
-    axis moves any. The control is that of the replay; a value that is constant in training is believed rightly there.
-    **nearest belief**: it sees the moved parameters, and takes each for the nearest value of training, and an unseen
-    word for one of training.
-  * **learner**: of the policies trained on 200 demonstrations ([baselines](baselines.md)), the one that solves most of
-    its 20 training scenarios, over all its trainings. Its excess is paired by twins, or marked *unpaired*. {predicted}
-  *solved by motion memory* or *object-centric memory*: only vision can be tested there, if anything. In a task with a
-  choice (`domino_select`) the memory of the twin contains the answer: an axis that makes the choice harder to see
-  cannot break it. Use `scengen evaluate` to measure whether a policy still chooses correctly.
-* **replay ends**, **oracle ends**: the first point of the path at which half of the twins or fewer are solved; 0 is
-  the edge of training, 1 the far end of the axis. The 95 % interval in brackets assumes no curve; the point before it
-  is a guess. `> x`: not before x; if x is the end of the path, with the number of twins solved there. `< 0`: the replay
-  fails as soon as its scene's own value is exchanged for the nearest end of training. Holes shorter than a tenth of the
-  axis, and beyond 1 shorter than half their distance from 0, may be missed.
-* **energy**: energy distance between the features of the twins [training ranges], its value by chance, and the p value
-  of a test that exchanges twins; `equal` if the axis moves no feature.
-
-{axes}
-## Rejected draws
-
-{lost}
-"""
-"""The page, with places for its tables."""
 CERTIFIED = ("certified", "oracle", "robosuite")
 """Titles of the figures of certification."""
 BASELINES = (*MOTION, *OBJECT_CENTRIC, *BELIEF)
@@ -108,10 +51,7 @@ N = "50"
 
 
 def main(*arguments: str) -> None:
-    """Make all cards, or those of some tasks, and write the page."""
-    if arguments == ("page",):
-        PAGE.write_text(page())
-        return
+    """Make all cards, or those of some tasks."""
     given = dict(argument.split("=", 1) for argument in arguments if "=" in argument)
     settings = [f"{name}={value}" for name, value in ({"n": N, "workers": "2"} | given).items()]
     tasks = [argument for argument in arguments if "=" not in argument]
@@ -122,41 +62,49 @@ def main(*arguments: str) -> None:
                 failed.append(f"{task.name}/{axis}")
             else:
                 axis_records.store_card(task, axis, int(given.get("n", N)))
-    PAGE.write_text(page())
     sys.exit(f"no card of {', '.join(failed)}" if failed else 0)
 
 
-def page() -> str:
-    """The whole page."""
+def fills() -> dict[str, str]:
+    """The tables of docs/axes.md."""
     certified = {task: ledger.latest("certified", task) for task in list_tasks()}
-    rows = _axes(certified)
+    rows = _axes(list_tasks())
     training = [
-        [f"[{task}](tasks/{task}.md)", *_certification(task, found.get(ID)), _cpu(task, found.get(ID))]
+        [f"[{task}](tasks/{task}.md)", *certification(task, found.get(ID)), _cpu(task, found.get(ID))]
         for task, found in certified.items()
     ]
-    lost = [
+    rejected = [
         f"* {task}, {split}: {times} {reason}"
         for task, found in certified.items()
         for split in task_files.splits(task)
         if split in found
         for reason, times in found[split].value.get("lost", {}).items()
     ]
-    return HEAD.format(
-        training=_table(("task", *CERTIFIED, "CPU s"), training),
-        predicted=predictors.sentence(),
-        verdicts=_verdicts(rows),
-        axes=_table(COLUMNS, rows),
-        lost="\n".join(lost),
-    )
+    return {
+        "training": _table(("task", *CERTIFIED, "CPU s"), training),
+        "predicted": predictors.sentence(),
+        "verdicts": _verdicts(rows),
+        "axes": _table(COLUMNS, [[f"[{row[0]}](tasks/{row[0]}.md#{row[1]})", *row[1:]] for row in rows]),
+        "rejected": "\n".join(rejected),
+    }
 
 
-def _axes(certified: Mapping[str, Mapping[str, Evidence]]) -> list[list[str]]:
-    """The cells of each axis, in the order of the task files."""
-    rows = []
-    for task in map(load_task, list_tasks()):
-        cards, found = axis_records.cards(task), axis_records.baselines(task)
-        rows += [_row(task, axis, cards.get(axis), found[axis], certified[task.name].get(axis)) for axis in task.axes]
-    return rows
+def of_task(task: str) -> dict[str, dict[str, str]]:
+    """The cells of the axes of a task by title."""
+    return {row[1]: dict(zip(COLUMNS[2:], row[2:], strict=True)) for row in _axes([task])}
+
+
+def _axes(tasks: Iterable[str]) -> list[list[str]]:
+    """The cells of each axis of some tasks, in the order of the task files."""
+    return [row for task in tasks for row in _rows(task)]
+
+
+@cache
+def _rows(name: str) -> list[list[str]]:
+    """The cells of each axis of a task."""
+    task = load_task(name)
+    certified, cards, found = ledger.latest("certified", name), axis_records.cards(task), axis_records.baselines(task)
+    return [_row(task, axis, cards.get(axis), found[axis], certified.get(axis)) for axis in task.axes]
 
 
 def _verdicts(rows: Sequence[Sequence[str]]) -> str:
@@ -188,7 +136,7 @@ def _row(
         cells[BASELINES.index("hidden_belief")] = "nothing hidden"
     judged = verdict(found.values()) if found else none
     return [
-        *(task.name, axis, outside, physics, *_certification(task.name, certified), judged, *cells),
+        *(task.name, axis, outside, physics, *certification(task.name, certified), judged, *cells),
         *(_learner(task.name, found), replay_ends, oracle_ends, energy),
     ]
 
@@ -200,7 +148,7 @@ def _learner(task: str, found: Mapping[str, Baseline]) -> str:
     return f"{best.name}: {_baseline(best)}" if best else predictors.cell(task, found)
 
 
-def _certification(task: str, row: Evidence | None) -> list[str]:
+def certification(task: str, row: Evidence | None) -> list[str]:
     """The figures of certification of a split. Earlier rows have no draws for the oracle, or no replays."""
     if row is None:
         return [ledger.not_measured(task)] * len(CERTIFIED)

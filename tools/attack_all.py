@@ -1,4 +1,4 @@
-"""Attack every task, and docs/attacks.md with a line for each.
+"""Attack every task. The tables of docs/attacks.md have a line for each.
 
     python tools/attack_all.py 500 [rules=paper] [workers=2] [TASK ...]
 
@@ -33,53 +33,6 @@ SEED = 4242
 """Seed of the draws and of the attack."""
 HITS = {STRICT: Path("generated/attack"), PAPER: Path("generated/attack/paper")}
 """Folders of the hits and logs, by the rules of the episodes."""
-PAGE = Path("docs/attacks.md")
-HEAD = f"""# Every task, attacked
-
-Written by `make attacks`: the results of the built-in adversary (`scengen attack`) on {SCENARIOS} training scenarios of
-each task, with every plan both through the teleoperation filter and raw. The adversary knows the bodies of a scene, a
-witness, and the kind of answer that the family declares; it knows nothing else of a task.
-
-* **random**: one to five random moves from the start (pick, push, place, press, turn, shake, throw, wait). **foreign**:
-  witnesses of the other scenarios. **shortcuts**: the declared ones, alone and in pairs. **servo**: feedback plans that
-  pursue, press down, block, cradle, carry through narrow ways, and do what a latch asks for by itself. **clock**: the
-  scenario's own solution, with every wait as long as in training on average; "-" if its waits hardly vary. Each
-  column shows hits of rollouts, and the one-sided 95 % Clopper-Pearson bound of the rate.
-* **1 memory, 2 memories**: the best training solutions, carried to the scenario by the pose of a body, one after the
-  other in one episode. They are chosen among sixteen on other draws. A memory that works says how little a policy must
-  see in training; it does what the oracle does, so it is no way around the task. "-" if fewer of them solved any
-  other draw, or where fixed answers, which come first, leave it no rollouts.
-* **1, 2, 3 fixed**: the best fixed answers (a lane, a share of a height), fitted on 300 other draws, and given one
-  after the other without looking at the scene: share of fresh draws that they solve, and its bound. "-" if the answer
-  is not a number, or if a wrong answer ends the episode.
-* **retries**: one move is repeated while a height, a tilt, a place or a direction is swept, often from a state of the
-  scenario's own witness. **own**: that witness with a phase dropped, repeated, mirrored, slowed or accelerated, with a
-  detour (a move beside its place, a held body pressed on another one, a body pushed aside before it is taken, a slip),
-  and a search that continues from its states. Starting from the witness, partial success is expected: these two columns
-  search for ways around the task, and their rates are no bounds.
-* **refuting**: hits without a contact that the oracle makes in its witness and in forty varied runs, which bypass the
-  task. There should be none; if you find one, please report it.
-
-The adversary knows the positions of the bodies, which no policy knows in `mirror_pick_place`. There a random pick at
-the right place is all that the task requires, so its rate says nothing about a policy that sees a mirrored picture.
-An arm with a suction cup has no servo plans but those that carry. There are none for `keyboard_typing`,
-where the fingers touch keys alone: the plans are for free bodies and for those that swing.
-
-"""
-OBSERVED = """
-## What observations tell
-
-Tier `leaks` on 200 draws of a split: a regression of each hidden parameter on each stream of Gymnasium and robosuite,
-at the start and after 0.3 s without action ([The adversary](adversary.md)). Made by `python tools/leaks_all.py`.
-
-"""
-UNDER_PAPER = """
-## Without the strict rules
-
-The same attack under the paper's rules alone, on the tasks that have rules of ours ([which](paper.md)): `rules=paper`
-in `scengen attack` and `scengen evaluate`. Hits that are refuting here are what these rules are for.
-
-"""
 COLUMNS = (
     *("task", "random", "foreign", "shortcuts", "servo", "clock", "1 memory", "2 memories"),
     *("1 fixed", "2 fixed", "3 fixed", "retries", "own", "rollouts", "refuting"),
@@ -88,7 +41,7 @@ COLUMNS = (
 
 
 def main(budget: str, *others: str) -> None:
-    """Attack all tasks, or some, and write the page."""
+    """Attack all tasks, or some."""
     names, options = parted(others, "rules", "workers")
     rules, workers = check_rules(options.get("rules", STRICT)), options.get("workers", "2")
     refuted = []
@@ -97,7 +50,6 @@ def main(budget: str, *others: str) -> None:
             continue
         if attacked(task, int(budget), rules, workers) and rules == STRICT:
             refuted.append(task.name)
-    PAGE.write_text(page())
     sys.exit(f"refuted, or not attacked: {', '.join(refuted)}" if refuted else 0)
 
 
@@ -126,39 +78,40 @@ def attacked(task: Task, budget: int, rules: str, workers: str) -> int:
     return status
 
 
-def page() -> str:
-    """The whole page, from the ledger."""
-    reports = _reports(STRICT)
-    hours = sum(report["cpu"] for report in reports.values()) / 3600
-    told = f"The rollouts of {len(reports)} tasks took {hours:.1f} hours of one core."
-    for missing in sorted({*list_tasks()} - {*reports}):
+def fills() -> dict[str, str]:
+    """The tables of docs/attacks.md."""
+    found = reports()
+    hours = sum(report["cpu"] for report in found.values()) / 3600
+    told = f"The rollouts of {len(found)} tasks took {hours:.1f} hours of one core."
+    for missing in sorted({*list_tasks()} - {*found}):
         told += f" `{missing}`: {ledger.not_measured(missing)}."
-    text = HEAD + told + "\n\n" + _table(reports) + _observed()
-    if relaxed := _reports(PAPER):
-        text += UNDER_PAPER + _table({f"`{task}`": report for task, report in relaxed.items()})
-    return text
+    return {"attacks": f"{told}\n\n{_table(found)}", "leaks": _leaks(), "paper": _table(reports(PAPER))}
 
 
-def _observed() -> str:
-    """What the observations of all splits tell; nothing if none has been searched."""
+def of_task(task: str) -> dict[str, str]:
+    """The cells of a task by title; nothing if it was not attacked."""
+    report = reports().get(task)
+    return dict(zip(COLUMNS[1:], _cells(report), strict=True)) if report else {}
+
+
+def _leaks() -> str:
+    """What the observations of all splits tell."""
     splits = {
         (task, split): row
         for task in list_tasks()
         for split, row in leaks_all.searched(task).items()
         if row.value["hidden"]
     }
-    if not splits:
-        return ""
     count = sum(len(row.value["hidden"]) for row in splits.values())
     told = [(*name, leak) for name, row in splits.items() for leak in row.value["found"]]
     tasks = len({task for task, _ in splits})
     text = f"Searched: {count} varying hidden parameters in {len(splits)} splits of {tasks} tasks. Told: {len(told)}.\n"
     for task, split, leak in told:
         text += f"\n* {task}, {split}: `{leak['stream']}` tells {leak['parameter']}, {leak['explained']:.0%} explained"
-    return OBSERVED + text + ("\n" if told else "")
+    return text + ("\n" if told else "")
 
 
-def _reports(rules: str) -> dict[str, Mapping[str, Any]]:
+def reports(rules: str = STRICT) -> dict[str, Mapping[str, Any]]:
     """The report on each task that was attacked, by the newest grammar of plans and with the most rollouts."""
     known = {task: [row for row in ledger.current("attack", task) if row.has(rules=rules)] for task in list_tasks()}
     newest = {
@@ -170,15 +123,14 @@ def _reports(rules: str) -> dict[str, Mapping[str, Any]]:
 
 
 def _table(reports: Mapping[str, Mapping[str, Any]]) -> str:
-    lines = [line(task, report) for task, report in reports.items()]
-    return f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|\n" + "".join(lines)
+    rows = [(f"[{task}](tasks/{task}.md)", *_cells(report)) for task, report in reports.items()]
+    return "".join(f"| {' | '.join(row)} |\n" for row in (COLUMNS, ("---",) * len(COLUMNS), *rows))
 
 
-def line(task: str, report: Mapping[str, Any]) -> str:
-    """The line of one task in the table."""
+def _cells(report: Mapping[str, Any]) -> list[str]:
+    """The cells of a task but for its name."""
     fixed = {len(prior["values"]): _share(prior) for prior in report["priors"]}
-    cells = [
-        task,
+    return [
         *(_counted(report, tier) for tier in ("random", "foreign", "shortcut", "servo", "clock")),
         *(_counted(report, tier) for tier in ("memory_1", "memory_2")),
         *(fixed.get(count, "-") for count in (1, 2, 3)),
@@ -186,7 +138,6 @@ def line(task: str, report: Mapping[str, Any]) -> str:
         str(report["rollouts"]),
         str(len(report["hits"])),
     ]
-    return f"| {' | '.join(cells)} |\n"
 
 
 def _counted(report: Mapping[str, Any], *tiers: str) -> str:

@@ -1,4 +1,4 @@
-"""What the ledger says of axes, from which docs/axes.md is written: cards, planners with beliefs, trained policies."""
+"""What the ledger says of axes, which docs/axes.md shows: cards, planners with beliefs, trained policies."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Plots of docs/baselines.md."""
+"""Plots of docs/baselines.md, for `baselines_page`."""
 
 from collections.abc import Mapping, Sequence
 

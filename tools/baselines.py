@@ -1,7 +1,7 @@
 """Train and evaluate small policies in training and on all axes: `python tools/baselines.py [TASK ...]`
 
 Pools, demonstrations and policies are made in generated/baselines. Results are stored in records/baseline, from which
-tools/baselines_page.py writes docs/baselines.md; docs/axes.md and docs/predictors.md read them, too. A repeated call
+`make docs` shows them on the pages of baselines, axes and predictors. A repeated call
 continues.
 """
 

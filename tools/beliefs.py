@@ -4,7 +4,7 @@
 
 Axes of the same version of their task that have a row with as many twins are left out, so that a repeated call
 continues; n=20 extends what n=8 has played. `fresh` plays all of them again. A twin takes 5 to 7 rollouts, about a
-second of processor time. `python tools/all_axes.py page` writes docs/axes.md from the ledger.
+second of processor time. docs/axes.md shows them.
 """
 
 import sys

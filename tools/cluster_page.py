@@ -1,20 +1,15 @@
-"""Writes the table of costs in docs/cluster.md from the ledger. `make docs`"""
-
-import re
-from pathlib import Path
+"""The table of costs in docs/cluster.md, from the ledger."""
 
 from scengen import list_tasks
 from scengen.evidence import ledger
 from scengen.samplers.split import ID
 
-PAGE = Path(__file__).parent.parent / "docs" / "cluster.md"
-BEGIN, END = "<!-- costs: tools/cluster_page.py -->\n", "<!-- end of costs -->\n"
 HOUR, DAY = 3600.0, 86_400.0
 
 
-def page() -> str:
-    """The page with its table up to date."""
-    return re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}{table()}{END}", PAGE.read_text(), flags=re.S)
+def fills() -> dict[str, str]:
+    """The table of docs/cluster.md."""
+    return {"costs": table()}
 
 
 def table() -> str:
@@ -38,8 +33,3 @@ def table() -> str:
 def _line(what: str, cpu: float) -> str:
     costs = (1e4 * cpu / HOUR, 1e6 * cpu / DAY, 1e7 * cpu / DAY)
     return f"| {what} | {cpu:.1f} | {' | '.join(f'{cost:.0f}' for cost in costs)} |"
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page())
-    print(f"wrote {PAGE}")

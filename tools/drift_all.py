@@ -1,4 +1,4 @@
-"""Every task under several versions of MuJoCo, and docs/drift.md.
+"""Every task under several versions of MuJoCo, for docs/drift.md.
 
     python tools/drift_all.py 2 POOLS 3.5.0,4.0.0 [task ...]
 
@@ -28,48 +28,15 @@ OOD = 2
 """Number of scenarios of an axis."""
 LEVEL = "recheck"
 """Level of the checks."""
-PAGE = Path("docs/drift.md")
-HEAD = """# Verdicts under other versions of MuJoCo
-
-Written by `make drift`: the results of `scengen verify mujoco` on training scenarios of every task and on some of one
-axis (the paper's where the task has one). Each version of MuJoCo has an environment of its own, made by venv and pip
-and kept in `~/.cache/scengen`. Everything else in it (Python, numpy, numba, scengen itself) is that of the running
-environment, so only MuJoCo differs.
-
-* **same bits**: the witness ends in the same bits, and every repeated check agrees with the certificate.
-* **same verdict**: every repeated check agrees with the certificate; the witness ends in other bits.
-* **flipped**: a check contradicts the certificate: `witness`, the recorded actions no longer reach the goal; `solved`,
-  the oracle no longer reaches it either; or a check of the scene (`overlap`, `rest`, `idle`, ...). The flipped checks
-  are given in brackets.
-
-The version that made the pools is the control: if its scenarios do not all have the same bits, the machine is another
-one. Level `recheck` makes all checks that need no oracle. If the witness fails, the oracle is tried to find out whether
-the scenario can still be solved: `witness` without `solved` means that only the recording fails, and the scenario can
-be certified under the new version with a new witness. `scengen verify` always reports a pool as `declined` under any
-MuJoCo but its own: certificates refer to the version that made them.
-
-"""
-LOCK = """
-## scengen.lock
-
-`scengen generate` writes `scengen.lock` beside every pool: the versions of the packages that the code of its verdicts
-imports, as lines that pip accepts as requirements and as constraints, and in comments Python, platform, processor and
-the hash of the code. The file repeats the manifest, which is authoritative and whose hash does not depend on the file.
-A file that contradicts the manifest is refuted; a file that lists packages which no verdict uses is reported, and its
-use is not recommended. If a version on this machine differs, `scengen verify` says so and how to restore it: `pip
-install --no-deps -r POOL/scengen.lock` in an environment with scengen (`--no-deps`, as in `make setup`: robosuite
-requires packages that scengen does not use). A run that was begun with other packages is not continued.
-"""
 
 
 def main(n: str, pools: str, versions: str, *tasks: str) -> None:
-    """Compare all tasks, or some, and write the page."""
+    """Compare all tasks, or some, and store the results."""
     missing = []
     for task in map(load_task, tasks or list_tasks()):
         for split, count in ((ID, int(n)), (axis_of(task), OOD)):
             if not compared(task, split, count, Path(pools), versions.split(",")):
                 missing.append(f"{task.name}/{split}")
-        PAGE.write_text(page())
     sys.exit(f"not compared: {', '.join(missing)}" if missing else 0)
 
 
@@ -109,11 +76,11 @@ def shortened(result: dict[str, Any]) -> dict[str, Any]:
     return {"scenarios": result["scenarios"], "counts": counts, "control": pool["versions"]["mujoco"]}
 
 
-def page() -> str:
-    """The page on the results of all tasks, by the set of versions."""
+def fills() -> dict[str, str]:
+    """The results of all tasks, by the set of versions."""
     rows = [row for task in list_tasks() for row in ledger.current("drift", task)]
     sets = sorted({tuple(row.made_with["mujoco"]) for row in rows})
-    return HEAD + "\n".join(table(names, [row for row in rows if row.has(mujoco=[*names])]) for names in sets) + LOCK
+    return {"drift": "\n".join(table(names, [row for row in rows if row.has(mujoco=[*names])]) for names in sets)}
 
 
 def table(versions: Sequence[str], rows: Sequence[Evidence]) -> str:
@@ -146,9 +113,9 @@ def table(versions: Sequence[str], rows: Sequence[Evidence]) -> str:
 def _line(task: str, versions: Sequence[str], rows: Sequence[Evidence]) -> str:
     """The row of a task: the sum of its pools."""
     if not rows:
-        return _row(task, 0, [ledger.not_measured(task)] * len(versions))
+        return _row(f"[{task}](tasks/{task}.md)", 0, [ledger.not_measured(task)] * len(versions))
     counts = [total([row.value["counts"][version] for row in rows]) for version in versions]
-    return _row(task, sum(row.n for row in rows), list(map(cell, counts)))
+    return _row(f"[{task}](tasks/{task}.md)", sum(row.n for row in rows), list(map(cell, counts)))
 
 
 def _row(task: str, count: int, told: list[str]) -> str:

@@ -1,15 +1,14 @@
-"""Play the cheats that people found, into records/cheat, and write docs/kept_cheats.md.
+"""Play the cheats that people found, into records/cheat. docs/kept_cheats.md shows them.
 
     python tools/kept_cheats.py [TASK ...]
 
 Each cheat of `tests/attack/hands` is played on the same draws of training in its task as it is and without its mend. A
-repeated call continues. With `page` alone, the tool only writes the page. What the adversary finds by itself is told by
-`tests/attack/recall.py`.
+repeated call continues. What the adversary finds by itself is told by `tests/attack/recall.py`.
 """
 
 import importlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
@@ -23,48 +22,25 @@ from scengen.attack.campaign import GRAMMAR
 from scengen.evidence import ledger, measuring
 from scengen.samplers.split import ID
 
-ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "kept_cheats.md"
 DRAWS = 12
 """Number of training draws."""
-HEAD = f"""# Kept cheats
-
-Written by `python tools/kept_cheats.py`. Every cheat was found by a person with the skills that oracles use, and reads
-no hidden parameter. It is kept in `tests/attack/hands`, with the rule or the physics that closes it
-([Attacking a task by hand](cheats.md)). Here each is played on {DRAWS} fresh training draws, in the task as it is and
-without that mend, and through the filter unless stated otherwise. The last column is what the adversary finds without
-the mend (`python tests/attack/recall.py`): the tier whose plan the closed task refuses, or, if the mend is one of
-physics, the tiers that succeed more than twice as often as in the closed task.
-
-| task | idea | cheat | solved | without the mend | the adversary finds |
-|---|---|---|---|---|---|
-"""
-CLAUSES = """
-## Rules and parts of goals, left out one at a time
-
-Made by `python tools/mutation_score.py`. Clauses of rules and of goals are left out, and some values leave their
-constraints. Then every cheat that somebody wrote for the task is played, declared shortcuts included. If one succeeds
-because of it, the adversary attacks without shortcuts on ten scenarios until it finds such a way as well, with at most
-500 rollouts, as in [every task, attacked](attacks.md). "Random" is what random macros find with as many. The last
-column counts runs of the oracle with 1.5 times a certificate's jitter, in the whole task, that would be taken for a way
-around it.
-
-| task | left out | exploited by a written cheat | found by the adversary | random | varied runs flagged |
-|---|---|---|---|---|---|
-"""
+COLUMNS = ("task", "idea", "cheat", "solved", "without the mend", "the adversary finds")
+"""Titles of the table of cheats."""
+CLAUSES = (
+    *("task", "left out", "exploited by a written cheat", "found by the adversary", "random", "varied runs flagged"),
+)
+"""Titles of the table of clauses."""
 
 
 def main(*names: str) -> None:
-    """Play what is missing, and write the page."""
-    for name, cheat in HANDS if names != ("page",) else ():
+    """Play what is missing."""
+    for name, cheat in HANDS:
         task, made_with = load_task(name), {"cheat": cheat, "draws": DRAWS}
         if (names and name not in names) or measuring.measured(task, ID, "cheat", made_with):
             continue
         found = played(name, cheat)
         measuring.keep(task, ID, "cheat", DRAWS, found, made_with)
         print(f"{name} {cheat}: {found['closed']} of {DRAWS}, {found['open']} without its mend", flush=True)
-    PAGE.write_text(page())
-    print(f"wrote {PAGE.relative_to(ROOT)}")
 
 
 def played(task: str, cheat: str) -> dict[str, int]:
@@ -75,9 +51,13 @@ def played(task: str, cheat: str) -> dict[str, int]:
     }
 
 
-def page() -> str:
-    """The page of all cheats."""
-    return HEAD + "".join(f"{row}\n" for row in rows()) + CLAUSES + "".join(f"{row}\n" for row in clauses())
+def fills() -> dict[str, str]:
+    """The tables of docs/kept_cheats.md."""
+    return {"cheats": _table(COLUMNS, rows()), "clauses": _table(CLAUSES, clauses())}
+
+
+def _table(titles: Sequence[str], lines: Iterable[str]) -> str:
+    return "".join(f"{line}\n" for line in (f"| {' | '.join(titles)} |", "|---" * len(titles) + "|", *lines))
 
 
 def clauses() -> Iterator[str]:

@@ -4,7 +4,7 @@
 
 Each split is searched by `scengen attack tiers=[leaks]`: 200 draws, eight seconds of processor time. Tasks without a
 hidden parameter have nothing to tell and are left out. A repeated call continues. `make attacks` runs it and tells the
-results in docs/attacks.md.
+results on the page of attacks.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Writes docs/paper.md: the decisions of each task where the paper is silent, and its differences. `make docs`
+"""Decisions of each task where the paper is silent, and its differences, for docs/paper.md.
 
 The text is taken from the docstrings of the families: everything after the paragraph that begins with "Bottleneck".
 """
@@ -13,30 +13,9 @@ from pathlib import Path
 from scengen import list_tasks, load_task
 from scengen.samplers.task import Task
 
-PAGE = Path(__file__).parent.parent / "docs" / "paper.md"
-HEAD = """# Differences from the paper
 
-The paper ([sources](../CONTRIBUTING.md#sources)) describes most tasks in a few sentences, gives few numbers, and
-contradicts itself in places. Each task states its decisions, and its differences from the paper, in the docstring
-of its family. `tools/paper_page.py` collects them here.
-
-Decisions that hold for all tasks:
-
-* Some tasks of the paper list two arms of which one is frozen. These tasks have one arm here, because the frozen
-  arm would only add unused dimensions.
-* Goals that the paper describes in words have numbers here, and a goal must hold for some time: `HOLD` of the family.
-* If a plan avoids what the paper says the task is about, the task closes it: by physics where possible, otherwise
-  by a strict rule that ends the episode, which the paper lacks. Certificates are made under all rules.
-  `rules="paper"` lifts the strict ones in Gymnasium, robosuite, and `scengen evaluate`, `teleop` and `attack`. A
-  witness succeeds under both. Other failures are the paper's, or losses after which the goal cannot be reached.
-* The paper's eight OOD conditions (App. I) are axes of their tasks (`scengen tasks axes=paper`). All other axes are
-  ours or follow another statement of the paper; each names its source.
-* MuJoCo is 3.5 and robosuite is 1.5.2 (the paper: 3.1.2 and 1.5). Certificates name the versions for which they hold.
-"""
-
-
-def page() -> str:
-    """The whole page."""
+def fills() -> dict[str, str]:
+    """The decisions of all tasks."""
     tasks = sorted(map(load_task, list_tasks()), key=lambda task: (task.category[:1] != "P", task.category, task.code))
     seen: set[str] = set()
     parts = []
@@ -45,7 +24,7 @@ def page() -> str:
         told = text if text not in seen else f"As {next(t.name for t in tasks if decisions(t) == text)}."
         seen.add(text)
         parts.append(f"\n## {task.code} [{task.name}](tasks/{task.name}.md)\n\n{told}\n{ending(task)}")
-    return HEAD + "".join(parts)
+    return {"decisions": "".join(parts)}
 
 
 def ending(task: Task) -> str:
@@ -123,8 +102,3 @@ def decisions(task: Task) -> str:
     if found is None or not text[found.end() :].strip():
         sys.exit(f"{task.name}: its docstring has no decisions after a paragraph that begins with Bottleneck")
     return text[found.end() :].strip()
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page())
-    print(f"wrote {PAGE}")

@@ -1,14 +1,13 @@
-"""Which cheap baseline predicts what an axis does to a learner, as docs/predictors.md: `python tools/predictors.py`
+"""Which cheap baseline predicts what an axis does to a learner: the tables of docs/predictors.md, from the ledger.
 
-The page is written from the ledger. It compares the loss of each baseline, and the distance of the features, with the
-learner's loss, over all axes on which a learner was tried that works in training.
+They compare the loss of each baseline, and the distance of the features, with the learner's loss, over all axes on
+which a learner was tried that works in training.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import axis_records
 import numpy as np
@@ -19,7 +18,6 @@ from scengen.evaluate.statistics import NORMAL_QUANTILE
 from scengen.evidence import ledger
 from scengen.ood.baseline import BELIEF, INCONCLUSIVE, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline, verdict
 
-PAGE = Path(__file__).parent.parent / "docs" / "predictors.md"
 MIN_AXES = 60
 """Number of axes from which the best predictor is chosen. At 60, the interval of a rank correlation of 0.5 has a half
 width of 0.2, so that a good predictor can be told from a useless one."""
@@ -76,23 +74,6 @@ EXCEPTIONS = {
     ),
 }
 """Axes on which the card and the learner disagree, and what was found when the learner was watched."""
-HEAD = f"""# Predicting a learner
-
-Written by `make docs` from the figures in [every split, measured](axes.md). A learner costs minutes of training and
-hours of certification for each task, the other baselines cost seconds for each axis. This page asks which of them
-predicts the learner.
-
-* **loss**: success within training minus success on the axis. An axis counts if a learner was tried on it that solves
-  at least half of the training scenarios. A predictor that is too weak or was not tried on an axis does not count
-  there.
-* **rank correlation**: Spearman's, between the losses of the predictor and of the learner, with its 95 % interval
-  (Bonett and Wright 2000). It needs four axes.
-* **AUC**: probability that the predictor's loss is larger on an axis that breaks the learner than on one that does not;
-  0.5 is chance.
-* The best predictor is that with the highest rank correlation over at least {MIN_AXES} axes. [Every split,
-  measured](axes.md) shows what it says of axes that no learner has tried, or the next best one where it was not tried.
-
-"""
 
 
 @dataclass(frozen=True)
@@ -114,13 +95,13 @@ class Score:
         return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
 
 
-def main() -> None:
-    """Write the page."""
-    PAGE.write_text(page())
+def fills() -> dict[str, str]:
+    """The tables of docs/predictors.md."""
+    return {"predictors": _scores(), "sentence": sentence(), "trials": _tried(), "exceptions": _exceptions()}
 
 
-def page() -> str:
-    """The whole page."""
+def _scores() -> str:
+    """The table of the predictors."""
     rows = [("predictor", "axes", "rank correlation", "AUC")]
     for name in PREDICTORS:
         found = score(name)
@@ -129,35 +110,19 @@ def page() -> str:
             told = "{:+.2f} [{:+.2f}, {:+.2f}]".format(found.correlation, *found.interval)
         auc = "not defined" if found.auc is None else f"{found.auc:.2f}"
         rows.append((_spelled(name), str(found.axes), told, auc))
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    tried = [
-        f"| {one.task} | {one.axis} | {one.learner.name} | {one.drop:+.2f} | {one.learner.finding} |"
-        for one in _trials()
-    ]
-    listed = [
-        "Axes on which a learner was tried:",
-        "",
-        "| task | axis | learner | loss | finding |",
-        "|---|---|---|---|---|",
-        *tried,
-    ]
-    return (
-        HEAD
-        + "\n".join([*lines[:1], "|---" * 4 + "|", *lines[1:], "", sentence(), "", *listed, "", *_exceptions()])
-        + "\n"
-    )
+    return _table(rows)
 
 
-def _exceptions() -> list[str]:
-    """The section of the axes on which the card and the learner disagree."""
-    lines = [
-        "## Exceptions",
-        "",
-        "Axes that break an object-centric memory or a belief and not the learner, or the learner alone:",
-        "",
-        "| task | axis | card | learner in training and here | what it is |",
-        "|---|---|---|---|---|",
-    ]
+def _tried() -> str:
+    """The table of the axes on which a learner was tried."""
+    rows = [("task", "axis", "learner", "loss", "finding")]
+    rows += [(one.task, one.axis, one.learner.name, f"{one.drop:+.2f}", one.learner.finding) for one in _trials()]
+    return _table(rows)
+
+
+def _exceptions() -> str:
+    """The table of the axes on which the card and the learner disagree."""
+    rows = [("task", "axis", "card", "learner in training and here", "what it is")]
     for one in (trial for trial in _trials() if DISTANCE in trial.losses):  # which a card tells
         broken = any(found.finding == "breaks" for found in one.card if found.name in (*OBJECT_CENTRIC, *BELIEF))
         told = verdict(one.card)
@@ -166,8 +131,13 @@ def _exceptions() -> list[str]:
             rates = [one.learner.training, one.learner.here]
             counts = " → ".join(f"{100 * rate.value:.0f} %" for rate in rates if rate)
             what = EXCEPTIONS.get((one.task, one.axis), "not looked into")
-            lines.append(f"| {one.task} | {one.axis} | {told} | {counts} | {what} |")
-    return lines
+            rows.append((one.task, one.axis, told, counts, what))
+    return _table(rows)
+
+
+def _table(rows: Sequence[Sequence[str]]) -> str:
+    titles, *others = rows
+    return "".join(f"| {' | '.join(row)} |\n" for row in (titles, ["---"] * len(titles), *others))
 
 
 def sentence() -> str:
@@ -250,7 +220,3 @@ def _trials() -> list[Trial]:
             card = tuple(one for name, one in baselines.items() if name not in LEARNERS)
             found.append(Trial(task.name, axis, learner, card, losses))
     return found
-
-
-if __name__ == "__main__":
-    main()

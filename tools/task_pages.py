@@ -1,118 +1,91 @@
-"""Writes docs/tasks: a page for each task, from its family, its task file and one certificate. `make docs`
+"""The page of a task: its family and task file, its figures in the ledger, and its films, if they are made."""
 
-`python tools/task_pages.py [task ...]` writes the pages of the named tasks only. docs/tasks.png shows the first
-scene of all tasks. Pictures need OpenGL.
-"""
-
+import html
 import inspect
-import io
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+import all_axes
+import attack_all
+import baselines_page
+from task_pictures import FRAMES, SCENARIO
 
-from scengen import list_tasks, load_task
+from scengen import load_task
 from scengen.agents import facts
 from scengen.evidence import ledger
-from scengen.pictures.film import Take, strip
-from scengen.pictures.render import Picture, camera
+from scengen.evidence.behaviour import Behaviour
+from scengen.samplers import task_files
 from scengen.samplers.axis import spell
 from scengen.samplers.dists import Fixed
-from scengen.samplers.task import ID, Task
-from scengen.validate.certify import Certified, certify
-from scengen.validate.rebuilt import rebuild
+from scengen.samplers.split import ID
+from scengen.samplers.task import Task
+from scengen.site.exhibit import Exhibit, Pair
 
-FOLDER = Path("docs/tasks")
-AXES = Path("docs/axes.md")
-ATTACKS = Path("docs/attacks.md")
-SCENARIO = 0
-"""Index of the training scenario that is shown."""
-FRAMES = 8
-"""Number of pictures in a film strip."""
-WIDTH = 320
-"""Width of a picture in a film strip [pixels]."""
-HEIGHT = 240
-"""Height of a picture in a film strip [pixels]."""
-OVERVIEW = Path("docs/tasks.png")
-"""Picture that shows the first scene of all tasks."""
-COLUMNS = 4
-"""Scenes in a row of the overview."""
-SMALL = (300, 225)
-"""Width and height of a scene in the overview [pixels]."""
-LABEL = 24
-"""Height of the text under a scene in the overview [pixels]."""
+PLAYED = f"{ID} 0 "
+"""Beginning of the names of the stored rollouts that are shown: those in the first training draw."""
 
 
-def main(*names: str) -> None:
-    """Write the pages."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    for name in names or list_tasks():
-        task = load_task(name)
-        scenario = task.draw(ID, 0, SCENARIO).scenario
-        certified = certify(scenario, task.horizon, embodiment=task.embodiment)
-        if certified.certificate.verdict != "certified":
-            sys.exit(f"{name}: scenario {SCENARIO} is {certified.certificate.reason}")
-        take = Take(scenario, certified.scene_xml, task.embodiment, certified.witness)
-        _save(FOLDER / f"{name}.jpg", strip(take, FRAMES, WIDTH, HEIGHT))
-        (FOLDER / f"{name}.md").write_text(page(task, certified, take.seconds))
-        print(f"wrote {FOLDER / name}.md", flush=True)
-    Image.fromarray(overview()).save(OVERVIEW, optimize=True)
+def page(name: str, films: Path | None = None) -> str:
+    """The page of a task, Markdown.
 
-
-def overview() -> Picture:
-    """First states of one training scenario of every task, each under its code and name, in the order of the paper."""
-    scenes = []
-    for task in sorted(map(load_task, list_tasks()), key=lambda task: (task.code[0] != "T", task.code)):
-        scene_xml = rebuild(task.draw(ID, 0, SCENARIO).scenario)
-        with camera(scene_xml, task.embodiment, *SMALL) as view:
-            scenes.append(labelled(view.take(), f"{task.code} {task.name}"))
-    empty = np.full_like(scenes[0], 255)
-    scenes += [empty] * (-len(scenes) % COLUMNS)
-    return np.vstack([np.hstack(scenes[k : k + COLUMNS]) for k in range(0, len(scenes), COLUMNS)])
-
-
-def labelled(picture: Picture, text: str) -> Picture:
-    """A picture above a line of text."""
-    line = Image.new("RGB", (picture.shape[1], LABEL), "white")
-    ImageDraw.Draw(line).text((6, LABEL // 2), text, "black", ImageFont.load_default(LABEL * 2 // 3), anchor="lm")
-    return np.vstack([picture, np.asarray(line)])
-
-
-def page(task: Task, certified: Certified, seconds: float) -> str:
-    """The page of one task."""
+    Args:
+        name: the task.
+        films: folder that `scengen site` has written, as it lies beside the pages.
+    """
+    task = load_task(name)
+    made = Exhibit.read(films / "tasks" / name) if films else None
     return "\n".join(
         [
             *_story(task),
-            f"![Witness of scenario {SCENARIO}: {FRAMES} pictures in {seconds:g} s]({task.name}.jpg)",
-            "",
-            f"*Witness of training scenario {SCENARIO}: {seconds:g} s, from the upper left to the lower right.*",
-            "",
+            *_films(made),
             *_facts(task),
             *_understanding(task),
             *_parameters(task),
-            *_axes(task),
-            *_plans(certified),
+            *_axes(task, made),
+            *_certified(task),
+            *_plans(task),
             *_attacks(task),
-            "",
+            *_policies(task),
         ]
     )
 
 
 def _story(task: Task) -> Iterator[str]:
-    """Docstring of the family's module. Its sketch is indented, so Markdown shows it as it is."""
+    """Docstring of the family's module below a short title. Its sketch is indented, so Markdown shows it as it is."""
     told = inspect.getdoc(inspect.getmodule(task.family)) or ""
     title, _, rest = told.partition("\n")
-    yield from (f"# {title.rstrip('.')}", "", rest.strip("\n"), "")
+    yield from (f"# {task.name}", "", f"**{title.rstrip('.')}.**", "", rest.strip("\n"), "")
+    yield from (f"![Witness of a training scenario in {FRAMES} pictures]({task.name}.jpg)", "")
+    yield from ("*A solution of a training scenario, from the upper left to the lower right.*", "")
+
+
+def _films(made: Exhibit | None) -> Iterator[str]:
+    """The player of the films, with a link for each of them."""
+    if made is None or not made.clips:
+        return
+    player = "../films/player.html?film="
+    links = (
+        f'<a href="{player}{html.escape(clip.address)}" target="film">{html.escape(_title(clip.title))}</a>'
+        f" ({html.escape(clip.outcome)}, {clip.seconds:.1f} s)"
+        for clip in made.clips
+    )
+    yield from ("## Films in three dimensions", "")
+    yield f"<p>Drag to turn, scroll or pinch to come closer: {' · '.join(links)}.</p>"
+    first = player + html.escape(made.clips[0].address)
+    yield f'<iframe class="film" name="film" title="Film" loading="lazy" src="{first}"></iframe>'
+    yield ""
+
+
+def _title(clip: str) -> str:
+    return "a solution" if clip == "witness" else f"a shortcut, {clip.replace('_', ' ')}"
 
 
 def _facts(task: Task) -> Iterator[str]:
     yield f"> {task.instruction}"
     yield ""
-    yield f"Paper: {task.code}, category {task.category}. Version {task.version}. "
-    yield f"Time limit {task.horizon:g} s. Robot: `{task.embodiment}`. "
+    yield f"Paper: {task.code}, category {task.category}. Version {task.version}."
+    yield f"Time limit {task.horizon:g} s. Robot: `{task.embodiment}`."
     yield f"Family: `{task.family.__module__}.{task.family.__name__}`; distributions: `conf/task/{task.name}.yaml`."
     yield ""
 
@@ -120,14 +93,14 @@ def _facts(task: Task) -> Iterator[str]:
 def _understanding(task: Task) -> Iterator[str]:
     """Sub-goals in one of the right orders, and the questions with their answers in the scenario that is shown."""
     sheet, told = facts.load(task), task.draw(ID, 0, SCENARIO).scenario.facts()
-    yield from ("## What it takes", "")
+    yield from ("## Sub-goals and questions", "")
     rows = []
     for name, subgoal in sheet.order.items():
         before = [f"`{one}`" for one, giver in sheet.order.items() if set(giver.gives) & set(subgoal.needs)]
         notes = [note for note in ("senses", "optional", "repeats") if getattr(subgoal, note)]
         rows.append((f"`{name}`", subgoal.outcome, ", ".join(before), ", ".join(notes)))
     yield from _table(("sub-goal", "outcome", "after", "notes"), rows)
-    yield f"What a model is asked ([how](../agents.md)), and the answers in training scenario {SCENARIO}:"
+    yield "[Questions for a model](../agents.md), and the answers in the training scenario of the picture:"
     yield ""
     rows = []
     for name, question in sheet.facts.items():
@@ -159,63 +132,105 @@ def _parameters(task: Task) -> Iterator[str]:
     yield ""
 
 
-def _axes(task: Task) -> Iterator[str]:
-    """Every axis with its new distributions, and its figures in docs/axes.md."""
+def _axes(task: Task, made: Exhibit | None) -> Iterator[str]:
+    """A section for every axis: its distributions, its pictures beside training, and its figures."""
     yield from ("## OOD axes", "")
-    rows = []
+    pairs = {pair.axis: pair for pair in made.pairs} if made else {}
+    measured = all_axes.of_task(task.name)
     for axis in task.axes.values():
-        goes = "; ".join(f"`{name}`: {spell(dist)}" for name, dist in axis.replace.items())
-        rows.append((f"`{axis.name}`", goes, " ".join(axis.why.split()), axis.source))
-    yield from _table(("axis", "new distributions", "why", "source"), rows)
-    yield from _measured(AXES, task)
+        yield from (f"### {axis.name}", "", " ".join(axis.why.split()), "")
+        for name, dist in axis.replace.items():
+            yield f"* `{name}`: {spell(task.training[name])} in training, {spell(dist)} here"
+        yield f"* source: {axis.source or 'none given'}"
+        yield ""
+        if axis.name in pairs:
+            yield from _pair(task, pairs[axis.name])
+        cells = measured[axis.name]
+        yield from _details(f"Measured: {cells['verdict']}", ("figure", "value"), cells.items(), "axes")
+
+
+def _pair(task: Task, pair: Pair) -> Iterator[str]:
+    """Pictures of a training scenario and of its twins on an axis."""
+    pictures = [("training", pair.twin), *((step.split, step.picture) for step in pair.steps)] if pair.twin else []
+    if pictures:
+        figures = (
+            f'<figure><img src="../films/tasks/{task.name}/{name}" alt="{html.escape(split)}" loading="lazy">'
+            f"<figcaption>{html.escape(split)}</figcaption></figure>"
+            for split, name in pictures
+        )
+        yield from (f'<div class="pair">{"".join(figures)}</div>', "")
+
+
+def _certified(task: Task) -> Iterator[str]:
+    """Certification of all splits."""
+    yield from ("## Certification", "")
+    found = ledger.latest("certified", task.name)
+    splits = [split for split in task_files.splits(task.name) if split in found]
+    if not splits:
+        yield from (f"Certification: {ledger.not_measured(task.name)}.", "")
+        return
+    rows = [(split, *all_axes.certification(task.name, found[split])) for split in splits]
+    yield from _table(("split", *all_axes.CERTIFIED), rows)
+    yield from ("[What the columns mean](../axes.md).", "")
+
+
+def _plans(task: Task) -> Iterator[str]:
+    """How shortcuts and ablations end in the first training draw of the stored behaviour."""
+    played = _behaviour(task.name).rollouts
+    yield from ("## Shortcuts that must fail", "")
+    rows = [
+        (f"`{name}`", "raw" if raw else "filtered", played[f"{PLAYED}shortcut {name}{raw}"][0])
+        for name in dict.fromkeys(one.split(",")[0] for one in _named(played, "shortcut"))
+        for raw in ("", ", raw")
+        if f"{PLAYED}shortcut {name}{raw}" in played
+    ]
+    yield from _table(("shortcut", "actions", "outcome"), rows)
+    yield from ("## Ablations in which the witness must fail", "")
+    rows = [(f"`{name}`", played[f"{PLAYED}ablation {name}"][0]) for name in _named(played, "ablation")]
+    yield from _table(("ablation", "outcome"), rows) if rows else ("This task has none.", "")
+
+
+def _named(played: Iterable[str], kind: str) -> list[str]:
+    """Names of the stored rollouts of a kind."""
+    start = f"{PLAYED}{kind} "
+    return [name.removeprefix(start) for name in played if name.startswith(start)]
+
+
+@cache
+def _behaviour(task: str) -> Behaviour:
+    return Behaviour.read(task_files.shipped("conf") / "behaviour" / f"{task}.json")
 
 
 def _attacks(task: Task) -> Iterator[str]:
     """Results of the adversary."""
     yield from ("## Attacks", "")
-    found = list(_measured(ATTACKS, task))
-    yield from found or (f"The adversary has not attacked this task: {ledger.not_measured(task.name)}.", "")
+    cells = attack_all.of_task(task.name)
+    if cells:
+        told = f"{cells['refuting']} ways around the task in {cells['rollouts']} rollouts"
+        yield from _details(told, ("tier", "hits"), cells.items(), "attacks")
+    else:
+        yield from (f"The adversary has not attacked this task: {ledger.not_measured(task.name)}.", "")
 
 
-def _measured(page: Path, task: Task) -> Iterator[str]:
-    """Lines of a task in the table of another page, if there are any."""
-    lines = page.read_text().splitlines() if page.is_file() else []
-    mine = [i for i, line in enumerate(lines) if line.startswith(f"| {task.name} |")]
-    if mine:
-        head = max(i for i in range(mine[0]) if lines[i].startswith("| task |"))
-        yield f"Measurements ([columns](../{page.name})):"
-        yield ""
-        yield from (*lines[head : head + 2], *(lines[i] for i in mine), "")
+def _policies(task: Task) -> Iterator[str]:
+    """Success of trained policies."""
+    yield from ("## Trained policies", "")
+    table = baselines_page.of_task(task.name)
+    if table:
+        yield from (table, "[What the columns mean](../baselines.md).", "")
+    else:
+        yield from (f"Trained policies: {ledger.not_measured(task.name)}.", "")
 
 
-def _plans(certified: Certified) -> Iterator[str]:
-    """Results of shortcuts and ablations in the scenario that is shown."""
-    certificate = certified.certificate
-    yield from ("## Shortcuts that must fail", "")
-    told = certificate["shortcuts"].numbers
-    rows = [(f"`{name}`", how, *_end(end)) for name, both in told.items() for how, end in both.items()]
-    yield from _table(("shortcut", "actions", "outcome", "reason", "after"), rows)
-    yield from ("## Ablations in which the witness must fail", "")
-    rows = [(f"`{name}`", *_end(end)) for name, end in certificate["ablations"].numbers.items()]
-    yield from _table(("ablation", "outcome", "reason", "after"), rows)
+def _details(summary: str, head: tuple[str, str], rows: Iterable[tuple[str, str]], about: str) -> Iterator[str]:
+    """A table that opens when its summary is clicked."""
+    yield from (f"<details><summary>{html.escape(summary)}</summary>", "")
+    yield from _table(head, rows)
+    yield from (f"[What the figures mean](../{about}.md).", "", "</details>", "")
 
 
-def _end(numbers: Mapping[str, Any]) -> tuple[str, ...]:
-    return numbers["outcome"], numbers["reason"], f"{numbers['seconds']:g} s"
-
-
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:
+def _table(head: tuple[str, ...], rows: Iterable[Sequence[str]]) -> Iterator[str]:
     yield f"| {' | '.join(head)} |"
     yield "|---" * len(head) + "|"
     yield from (f"| {' | '.join(row)} |" for row in rows)
     yield ""
-
-
-def _save(path: Path, picture: Picture) -> None:
-    content = io.BytesIO()
-    Image.fromarray(picture).save(content, "jpeg", quality=85, optimize=True)
-    path.write_bytes(content.getvalue())
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

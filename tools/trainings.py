@@ -10,7 +10,7 @@
 
 Pools, and the recording of default styles, are those of tools/baselines.py, which makes missing ones. Trainings differ
 in their seed, and are evaluated in training and on two axes. A repeated call continues. The results are shown in
-docs/baselines.md by `python tools/baselines_page.py`.
+docs/baselines.md, by `make docs`.
 """
 
 import json

@@ -1,1 +1,1 @@
-"""The static site: pages of tasks with films in three dimensions, pairs of twins, figures and the documentation."""
+"""The static site: pages of tasks with films in three dimensions, and pairs of twins."""

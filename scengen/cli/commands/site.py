@@ -22,7 +22,6 @@ class SiteSettings:
     """Settings of `scengen site`; conf/command/site.yaml explains them."""
 
     pool: str | list[str] | None
-    docs: str | None
     to: str
 
 
@@ -32,24 +31,21 @@ def command(arguments: Arguments) -> int:
     settings = read("site", [argument for argument in arguments if not argument.startswith("task=")], SiteSettings)
     if by_task and settings.pool is not None:
         raise BadConfig("give either task=NAME, to certify a scenario of it, or pool=FOLDER, to show those of pools")
-    docs = Path(settings.docs) if settings.docs else None
-    if docs is not None and not (docs / "README.md").is_file():
-        raise BadConfig(f"docs = {docs}; give a folder that holds README.md, and its further pages in docs/")
     try_folder(settings.to)
     search = search_path(arguments)
     shown = _of_pools(module, settings.pool, search) if settings.pool else _of_tasks(module, arguments, by_task)
     with ProgressBar(err, "site", len(shown)) as bar:
-        built = module.build(shown, Path(settings.to), docs, search, lambda done, _, what: bar.show(done, what))
+        built = module.build(shown, Path(settings.to), search, lambda done, _, what: bar.show(done, what))
     for name, why in built.failed.items():
         warn(f"scengen: {name} has no page: {why}")
     made = f"{len(built.made)} tasks made, {len(built.kept)} up to date, {len(built.failed)} failed"
-    say(f"wrote {Path(settings.to) / 'index.html'}: {made}, {built.documents} pages of documentation")
+    say(f"wrote {Path(settings.to) / 'index.html'}: {made}")
     return FAILED if built.failed else OK
 
 
 def _of_tasks(module: ModuleType, arguments: Arguments, chosen: bool) -> list[object]:
     """The chosen tasks, or all."""
-    others = [argument for argument in arguments if not argument.startswith(("pool=", "docs=", "to=", "task="))]
+    others = [argument for argument in arguments if not argument.startswith(("pool=", "to=", "task="))]
     asked = compose.combinations("site", arguments if chosen else [*arguments, "task=all"])
     names = [compose.chosen_task("site", one.overrides) for one in asked]
     return [module.Shown(compose.load_task(name, others)) for name in filter(None, names)]

@@ -2,10 +2,6 @@
 "use strict";
 document.documentElement.classList.add("scripted");
 
-// The navigation beside documents is open where there is room for it.
-for (const side of document.querySelectorAll("details.side, details.contents"))
-  side.open = matchMedia(side.matches(".side") ? "(min-width: 900px)" : "(min-width: 1300px)").matches;
-
 // Search: every word must be in a card. Other pages send their words here as ?q=.
 const field = document.querySelector("input[type=search]");
 const cards = [...document.querySelectorAll(".card")];
