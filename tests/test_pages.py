@@ -9,7 +9,7 @@ import pytest
 import results
 import task_pages
 
-from scengen import list_tasks
+from scengen import list_tasks, load_task
 
 ROOT = build_docs.ROOT
 PAGES = [path for pattern in build_docs.WRITTEN for path in sorted(ROOT.glob(pattern))]
@@ -44,6 +44,8 @@ def test_the_page_of_results_is_that_of_the_ledger():
     assert text == results.page(), "docs/results.md is out of date; run make results"
     assert text.count("\n") <= 300 and all(f"[{name}](tasks/{name}.jpg)" in text for name in list_tasks())
     assert all((ROOT / "docs" / "tasks" / f"{name}.jpg").is_file() for name in list_tasks())
+    axes = sum(len(load_task(name).axes) for name in list_tasks())
+    assert f"along {axes} out-of-distribution" in (ROOT / "README.md").read_text()
 
 
 @pytest.mark.parametrize("page", build_docs.FILLS)
