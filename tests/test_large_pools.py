@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 from synthetic_pool import synthetic
 
 from scengen import cli
-from scengen.cli import sheet
 from scengen.cli import tables as report
 from scengen.envs.gym import PoolEnv
 from scengen.errors import PoolError
 from scengen.ood.analysis import redraw
 from scengen.ood.analysis.distance import MAX_PAIRS, near_duplicates
 from scengen.ood.analysis.space import Batch
+from scengen.pictures import sheet
 from scengen.pool import Pool, shards, writing
 from scengen.pool.directory import Directory
 from scengen.pool.library import Library
@@ -141,7 +141,7 @@ def test_showing_a_pool_reads_no_witness_and_says_what_it_leaves_out(large, touc
 
 def test_statistics_read_no_witness_and_say_of_what_they_are(large, touched, capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(redraw, "MAX_REDRAWN", 100)
-    commands = (["compare"], ["audit"], ["report", f"to={tmp_path / 'r.html'}"])
+    commands = (["report", "compare"], ["report", "audit"], ["report", f"to={tmp_path / 'r.html'}"])
     for command in commands:
         assert cli.run([*command, f"pool={large}"]) == 0, capsys.readouterr().err
     told = capsys.readouterr().out

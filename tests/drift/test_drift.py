@@ -13,7 +13,8 @@ from pools import make
 
 from scengen import cli, list_tasks, load_task
 from scengen.certificate import CHECKS
-from scengen.cli.commands import bench, drift
+from scengen.cli.commands import bench
+from scengen.cli.commands import verify_mujoco as drift
 from scengen.drift import environment as environments
 from scengen.drift.environment import Environment, environment
 from scengen.drift.judge import Judge, judge

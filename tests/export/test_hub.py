@@ -150,7 +150,7 @@ def test_a_certificate_that_does_not_hold_gets_no_card(tmp_path, capsys):
             [f"pool={REFERENCE},{BASE / 'single_quick'}"],
             "are both domino_single-id; give one pool of each task and split",
         ),
-        ([f"pool={REFERENCE}", "licence=mit"], "no setting of publish named 'licence' (did you mean 'license'?)"),
+        ([f"pool={REFERENCE}", "licence=mit"], "no setting of export hub named 'licence' (did you mean 'license'?)"),
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(tmp_path, capsys, arguments, says):

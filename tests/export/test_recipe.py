@@ -124,5 +124,5 @@ def test_the_command_tells_what_to_run_next(recorded, tmp_path, capsys):
 
 
 def test_every_recipe_is_offered_by_the_command():
-    text = (Path(scengen.__file__).parents[1] / "conf" / "command" / "recipe.yaml").read_text()
+    text = (Path(scengen.__file__).parents[1] / "conf" / "command" / "export_recipe.yaml").read_text()
     assert all(name in text for name in RECIPES)

@@ -53,7 +53,7 @@ def _source(settings: TeleopSettings, arguments: Arguments) -> Source:
     """
     name = compose.chosen_task("demos pad", arguments)
     if (name is None) == (settings.pool is None):
-        raise BadConfig("teleop needs either task=NAME or pool=FOLDER; see scengen demos pad --help")
+        raise BadConfig("demos pad needs either task=NAME or pool=FOLDER; see scengen demos pad --help")
     if name is not None:
         if settings.id is not None:
             raise BadConfig(f"id = {settings.id} names a scenario of a pool; give pool=FOLDER, or index= with task=")
