@@ -1,5 +1,6 @@
 """Turn a mesh file into an asset of convex pieces, put it into a scene, and let it fall. Prints where it ends."""
 
+import math
 import sys
 from pathlib import Path
 
@@ -26,7 +27,8 @@ def main():
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, nstep=round(2.0 / model.opt.timestep))
     x, y, z = data.body("thing").xpos
-    print(f"dropped from 20 mm, it rests at x {x:.3f} m, y {y:.3f} m, {1000 * (z - TABLE_TOP):.1f} mm above the table")
+    aside, off = 1000 * math.hypot(x, y), 1000 * abs(z - TABLE_TOP)
+    print(f"dropped from 20 mm, it rests {off:.1f} mm off the table top, {aside:.1f} mm beside the place of the drop")
     return 0
 
 
