@@ -36,7 +36,14 @@ SOURCE = BUILD / "source"
 EXTRA = BUILD / "extra"
 """Folder of what is copied beside the HTML: `films`, if there are any."""
 WRITTEN = (
-    *("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "example/README.md", "integrations/*/README.md"),
+    *(
+        "README.md",
+        "CONTRIBUTING.md",
+        "CHANGELOG.md",
+        "examples/README.md",
+        "task_template/README.md",
+        "integrations/*/README.md",
+    ),
     *("docs/*.md", "docs/api/*.md"),
 )
 """Hand-written pages of the repository."""
