@@ -185,8 +185,9 @@ ROBOT_FIELDS = (
 """Fields of a compiled model that say what the robot is, and how it looks."""
 
 
+@cache
 def robot_sha256(embodiment: str) -> str:
-    """Hash of the robot of an embodiment on an empty table, in its first posture, to six digits."""
+    """Hash of the robot of an embodiment on an empty table, in its first posture, to six digits: a million numbers."""
     world = World.load(scene_text.emit(table())[0], embodiment, visual=True)
     parts = [np.asarray(getattr(world.model, name), float).ravel() for name in ROBOT_FIELDS]
     parts.append(world.data.qpos)

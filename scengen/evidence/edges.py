@@ -17,8 +17,8 @@ GRID = 12
 """Number of steps of a way between two parameter values, in each of which a constraint may begin to fail."""
 MAX_IN_STEP = 3
 """Largest number of limits that are looked for in one step."""
-BISECTIONS = 30
-"""Number of bisections of such a step."""
+BISECTIONS = 34
+"""Number of bisections between two places with different answers: to 1e-10 of their distance."""
 MARGIN = 1e-6
 """Share of the way by which the stored parameters are apart from the limit, on either side."""
 MAX_EDGES = 2
@@ -158,7 +158,7 @@ def _along(number: int, start: Scenario, end: Mapping[str, Value], known: Mappin
         for _ in range(MAX_IN_STEP):
             if first == last or first is None or last is None:
                 break
-            limit = _bisected(ask, low, high)
+            limit = bisected(ask, low, high)
             pair = at(limit - MARGIN), at(limit + MARGIN)
             before, after = (reasons(start, each) for each in pair)
             if before is None or after is None or before == after:
@@ -167,7 +167,7 @@ def _along(number: int, start: Scenario, end: Mapping[str, Value], known: Mappin
             low, first = limit + MARGIN, after
 
 
-def _bisected(ask: Callable[[float], Reasons | None], low: float, high: float) -> float:
+def bisected(ask: Callable[[float], Any], low: float, high: float) -> float:
     """A place between two at which an answer changes."""
     before = ask(low)
     for _ in range(BISECTIONS):

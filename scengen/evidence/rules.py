@@ -23,6 +23,7 @@ from ..scenario import Scenario
 from ..sim.arm import ROBOT, Arm
 from ..sim.recording import Question, RecordingWorld
 from ..sim.world import World
+from .edges import bisected
 from .rollouts import answer_of, whole
 
 MAX_STATES = 12
@@ -37,8 +38,6 @@ SWEPT = {"place": (0.02, 0.1, 0.5), "all": (0.02, 0.1, 0.5), "memory": (1.0, 100
 """Sizes of changes with all or none of the contacts, by kind of coordinate: a limit may appear that was not there."""
 MIXED = 120
 """Number of states with several random changes at once, for each stored state."""
-BISECTIONS = 34
-"""Number of bisections of a change of answer: to 1e-9 of the distance between two magnitudes."""
 MARGIN = 1e-6
 """Relative distance from a limit at which the rules are asked on either side of it."""
 MAGNITUDES = {
@@ -350,19 +349,11 @@ def limits(probe: Probe, along: Sequence[Coordinate]) -> Iterator[Limit]:
         found = [probe.at(place, size) for size in sizes]
         for (low, before), (high, after) in pairwise(zip(sizes, found, strict=True)):
             if before != after:
-                magnitude = _bisected(probe, place, low, high)
+                at = bisected(lambda size, place=place: probe.at(place, size), low, high)
+                magnitude = float(f"{at:.9g}")
                 sides = probe.around(place, magnitude)
                 if magnitude and sides[0] != sides[1]:
                     yield Limit(place, magnitude, sides[0], sides[1])
-
-
-def _bisected(probe: Probe, place: Place, low: float, high: float) -> float:
-    """A magnitude between two at which an answer changes, to nine digits."""
-    before = probe.at(place, low)
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if probe.at(place, middle) == before else (low, middle)
-    return float(f"{high:.9g}")
 
 
 State = NDArray[np.float64]
