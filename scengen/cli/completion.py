@@ -12,7 +12,7 @@ from .. import compose
 from ..errors import ScengenError
 from ..pool import Pool
 from ..samplers import task_files
-from .verbs import FORMS, parsed
+from .verbs import COMMANDS, FORMS, parsed
 
 BASH = r"""
 _scengen() {
@@ -40,8 +40,8 @@ def completions(line: str, verbs: Sequence[str]) -> list[str]:
     *before, word = line.split(" ")
     words = [text for text in before[1:] if text]
     if not words:
-        return [verb for verb in dict.fromkeys(verb.split(" ")[0] for verb in verbs) if verb.startswith(word)]
-    verb, others = parsed(tuple(words))
+        return [command for command in COMMANDS if command.startswith(word)]
+    verb, others = parsed(words)
     forms = [form for form in FORMS.get(words[0], ()) if form.startswith(word)] if len(words) == 1 else []
     if verb not in verbs:
         return forms

@@ -119,7 +119,7 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
 
 
 def _interrupted(argv: Sequence[str]) -> int:
-    continues = parsed(tuple(argv))[0] in CONTINUING
+    continues = parsed(argv)[0] in CONTINUING
     remedy = "finished work is kept; repeat the command to continue" if continues else "repeat it to start over"
     _print_error(f"scengen: interrupted; {remedy}")
     return INTERRUPTED
@@ -155,7 +155,7 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
         return OK
     if argv[0] in RENAMED:
         _print_error(f"scengen: `{argv[0]}` is now `{RENAMED[argv[0]]}`; the old name goes with 0.4")
-    verb, arguments = parsed(tuple(argv))
+    verb, arguments = parsed(argv)
     if verb == "--version":
         from ..installation import versions
 
@@ -187,7 +187,7 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
         out.print("\n".join(completions(" ".join(arguments), VERBS)), soft_wrap=True)
         return OK
     if verb in ("generate", "demos"):  # multiple values are a sweep there, with or without Hydra's option
-        arguments = tuple(a for a in arguments if a not in ("-m", "--multirun"))
+        arguments = [a for a in arguments if a not in ("-m", "--multirun")]
     flags = [a for a in arguments if a.startswith("-")]
     if flags and flags[0].partition("=")[0] in SHOW_OPTIONS:
         return _show(verb, arguments)

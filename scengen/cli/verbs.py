@@ -1,6 +1,6 @@
 """The commands of scengen in the order of its help, their forms, and the names that they had before."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "Generate and check": ("tasks", "try", "generate", "verify", "attack"),
@@ -65,9 +65,9 @@ CONTINUING = (
 """Commands that keep finished work when they are interrupted, and continue from there."""
 
 
-def parsed(words: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+def parsed(words: Sequence[str]) -> tuple[str, list[str]]:
     """The command or form that a command line begins with, by its present name, and the rest of the line."""
-    first, rest = words[0], words[1:]
+    first, *rest = words
     if first in RENAMED:
         return RENAMED[first], rest
     if rest and f"{first} {rest[0]}" in VERBS:

@@ -102,7 +102,7 @@ def test_an_old_name_runs_the_new_command_and_says_so(capsys, monkeypatch, old, 
         import_module(f"scengen.cli.commands.{file_stem(new)}"), "command", lambda arguments: run.append(arguments) or 0
     )
     status, err = said(capsys, old, "pool=here")
-    assert status == 0 and run == [("pool=here",)]
+    assert status == 0 and run == [["pool=here"]]
     assert err == f"scengen: `{old}` is now `{new}`; the old name goes with 0.4\n"
     assert cli.run(("--help",)) == 0 and f"\n  {old} " not in capsys.readouterr().out
     assert old not in cli.VERBS and old not in completions(f"scengen {old}", cli.VERBS)

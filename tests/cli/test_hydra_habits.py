@@ -140,7 +140,7 @@ def test_every_help_has_an_example_that_can_be_composed(verb):
     text = usage(verb, [DOMINO])
     (example,) = re.findall(r"^# Example: (scengen .*)$", text, re.M)
     program, *words = shlex.split(example)
-    given, overrides = parsed(tuple(words))
+    given, overrides = parsed(words)
     assert (program, given) == ("scengen", verb)
     for one in compose.combinations(verb, overrides) if verb == "generate" else [overrides]:
         compose.as_yaml(verb, getattr(one, "overrides", one))

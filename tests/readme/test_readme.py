@@ -25,7 +25,7 @@ def test_what_is_left_out_is_there():
 
 @pytest.mark.parametrize("line", LINES)
 def test_every_setting_of_a_command_exists(line, monkeypatch):
-    verb, words = parsed(tuple(shlex.split(line, comments=True)[1:]))
+    verb, words = parsed(shlex.split(line, comments=True)[1:])
     assert verb in cli.VERBS or verb == "--completion"
     if verb in cli.VERBS:
         overrides = [word for word in words if not word.startswith("-")]
