@@ -36,15 +36,8 @@ SOURCE = BUILD / "source"
 EXTRA = BUILD / "extra"
 """Folder of what is copied beside the HTML: `films`, if there are any."""
 WRITTEN = (
-    *(
-        "README.md",
-        "CONTRIBUTING.md",
-        "CHANGELOG.md",
-        "examples/README.md",
-        "task_template/README.md",
-        "integrations/*/README.md",
-    ),
-    *("docs/*.md", "docs/api/*.md"),
+    *("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "docs/api/*.md"),
+    *("examples/README.md", "task_template/README.md", "integrations/*/README.md"),
 )
 """Hand-written pages of the repository."""
 FILLS: Mapping[str, Callable[[], Mapping[str, str]]] = {
@@ -65,7 +58,7 @@ REPOSITORY = re.compile(r"<!-- repository -->\n.*?<!-- end -->\n", re.S)
 """Text of a page that only readers of the repository see."""
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FENCE = re.compile(r"(^```.*?^```$)", re.S | re.M)
-PICTURE = re.compile(r"docs/tasks/(\w+)\.jpg")
+PICTURE = re.compile(r"^docs/tasks/(\w+)\.jpg$")
 """Picture of a task. A link to it leads to the page of the task."""
 
 
@@ -146,8 +139,8 @@ def relocated(page: str, text: str) -> str:
         if not path or "://" in path or not (_is_file(target) or _is_page(target)):
             return found[0]
         is_picture = text[: found.start()].rpartition("[")[0].endswith("!")
-        if (task := PICTURE.fullmatch(target)) and not is_picture:
-            target = f"docs/tasks/{task[1]}.md"
+        if not is_picture:
+            target = _page_of(target)
         return f"]({os.path.relpath(stored(target), here)}{mark}{part})"
 
     parts = FENCE.split(text)
@@ -162,9 +155,7 @@ def navigation(page: str, text: str) -> Iterator[str]:
         title = section.partition("\n")[0] if section != text and not section.startswith("#") else ""
         entries = list[str]()
         for name, path in re.findall(r"^\| \[([^\]]+)\]\(([^)#]+)(?:#[^)]*)?\) \|", section, re.M):
-            target = _target(page, path)
-            if task := PICTURE.fullmatch(target):
-                target = f"docs/tasks/{task[1]}.md"
+            target = _page_of(_target(page, path))
             if target not in seen and _is_page(target):
                 seen.add(target)
                 entries.append(f"{name.strip('`')} <{os.path.relpath(stored(target), here).removesuffix('.md')}>")
@@ -183,6 +174,11 @@ def _links(text: str) -> Iterator[str]:
 def _target(page: str, link: str) -> str:
     """File of the repository to which a link of a page leads."""
     return os.path.normpath(os.path.join(os.path.dirname(page), link))
+
+
+def _page_of(path: str) -> str:
+    """The page of a task for its picture; any other path as it is."""
+    return PICTURE.sub(r"docs/tasks/\1.md", path)
 
 
 def _is_file(path: str) -> bool:
