@@ -203,7 +203,8 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
 def _unknown(verb: str, arguments: Sequence[str]) -> BadConfig:
     """Why the beginning of a command line names no command."""
     if verb in FORMS:
-        forms, given = FORMS[verb], cut(repr(arguments[0])) if arguments else "nothing"
+        given = next((cut(repr(word)) for word in arguments if not word.startswith("-")), "nothing")
+        forms = FORMS[verb]
         return BadConfig(
             f"{verb} needs one of {', '.join(forms)} after it, and got {given}; see scengen {verb} {forms[0]} --help"
         )
