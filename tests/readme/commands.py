@@ -21,6 +21,7 @@ PAGES = tuple(
 
 APART = {
     "make demo": "continuous integration runs it separately",
+    "make test": "continuous integration runs it separately",
     ".venv/bin/python examples/": "tests/test_examples.py runs them",
     "scengen generate task=domino_single split=diagonal+wide_gaps certify=full": "certifies at level full: 5 minutes",
     "scengen generate task=seesaw_balance": "64 scenarios: 10 minutes",
