@@ -1,54 +1,62 @@
-"""The page of a task: its family and task file, its figures in the ledger, and its films, if they are made."""
+"""The page of a task as Markdown: its family and task file, its figures in the ledger, and its films, if they are made.
+
+The documentation shows all of it, and the web site its sections.
+"""
 
 import html
 import inspect
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cache
 from pathlib import Path
 
-import all_axes
-import attack_all
-import baselines_page
-from task_pictures import FRAMES, SCENARIO
+from ..agents import facts
+from ..errors import BadConfig
+from ..evidence import ledger
+from ..evidence.behaviour import Behaviour
+from ..measures import figures
+from ..samplers import task_files
+from ..samplers.axis import spell
+from ..samplers.dists import Fixed
+from ..samplers.split import ID
+from ..samplers.task import Task
+from .exhibit import FRAMES, Exhibit, Pair
 
-from scengen import load_task
-from scengen.agents import facts
-from scengen.evidence import ledger
-from scengen.evidence.behaviour import Behaviour
-from scengen.samplers import task_files
-from scengen.samplers.axis import spell
-from scengen.samplers.dists import Fixed
-from scengen.samplers.split import ID
-from scengen.samplers.task import Task
-from scengen.site.exhibit import Exhibit, Pair
-
+SCENARIO = 0
+"""Index of the training scenario that is shown."""
+Figures = Mapping[str, Mapping[str, str]]
+"""Figures of each axis by title."""
 PLAYED = f"{ID} 0 "
 """Beginning of the names of the stored rollouts that are shown: those in the first training draw."""
 
 
-def page(name: str, films: Path | None = None) -> str:
+def page(task: Task, measured: Figures, films: Path | None = None) -> str:
     """The page of a task, Markdown.
 
     Args:
-        name: the task.
+        task: the task.
+        measured: figures of its axes, as from `measures.figures.axes`.
         films: folder that `scengen site` has written, as it lies beside the pages.
     """
-    task = load_task(name)
-    made = Exhibit.read(films / "tasks" / name) if films else None
+    made = Exhibit.read(films / "tasks" / task.name) if films else None
     return "\n".join(
         [
             *_story(task),
             *_films(made),
             *_facts(task),
-            *_understanding(task),
-            *_parameters(task),
-            *_axes(task, made),
-            *_certified(task),
+            *_heading("Sub-goals and questions", understanding(task), "agents"),
+            *_heading("Parameters", parameters(task)),
+            *_axes(task, made, measured),
+            *_heading("Certification", certification(task), "axes"),
             *_plans(task),
-            *_attacks(task),
-            *_policies(task),
+            *_heading("Attacks", attacks(task), "attacks"),
+            *_heading("Trained policies", policies(task), "baselines"),
         ]
     )
+
+
+def _heading(title: str, section: Iterable[str], about: str = "") -> Iterator[str]:
+    """A section below its heading, with a link to the page that explains it."""
+    link = (f"[What this section shows](../{about}.md).", "") if about else ()
+    yield from (f"## {title}", "", *section, *link)
 
 
 def _story(task: Task) -> Iterator[str]:
@@ -90,17 +98,23 @@ def _facts(task: Task) -> Iterator[str]:
     yield ""
 
 
-def _understanding(task: Task) -> Iterator[str]:
-    """Sub-goals in one of the right orders, and the questions with their answers in the scenario that is shown."""
-    sheet, told = facts.load(task), task.draw(ID, 0, SCENARIO).scenario.facts()
-    yield from ("## Sub-goals and questions", "")
+def understanding(task: Task, search: Sequence[str] = ()) -> Iterator[str]:
+    """Sub-goals in one of the right orders, and the questions with their answers in the scenario that is shown.
+
+    Nothing for a task without a sheet of facts.
+    """
+    try:
+        sheet = facts.load(task, search)
+    except BadConfig:
+        return
+    told = task.draw(ID, 0, SCENARIO).scenario.facts()
     rows = []
     for name, subgoal in sheet.order.items():
         before = [f"`{one}`" for one, giver in sheet.order.items() if set(giver.gives) & set(subgoal.needs)]
         notes = [note for note in ("senses", "optional", "repeats") if getattr(subgoal, note)]
         rows.append((f"`{name}`", subgoal.outcome, ", ".join(before), ", ".join(notes)))
     yield from _table(("sub-goal", "outcome", "after", "notes"), rows)
-    yield "[Questions for a model](../agents.md), and the answers in the training scenario of the picture:"
+    yield "Questions for a model, and the answers in the training scenario of the picture:"
     yield ""
     rows = []
     for name, question in sheet.facts.items():
@@ -119,8 +133,8 @@ def _answer(name: str, question: facts.Question, told: Mapping[str, float | str]
     return question.right if isinstance(question.right, str) else ", ".join(question.right)
 
 
-def _parameters(task: Task) -> Iterator[str]:
-    yield from ("## Parameters", "")
+def parameters(task: Task) -> Iterator[str]:
+    """Parameters with their units, bounds and ranges in training."""
     rows = []
     for p in task.known.values():
         dist = task.training[p.name]
@@ -132,11 +146,10 @@ def _parameters(task: Task) -> Iterator[str]:
     yield ""
 
 
-def _axes(task: Task, made: Exhibit | None) -> Iterator[str]:
+def _axes(task: Task, made: Exhibit | None, measured: Figures) -> Iterator[str]:
     """A section for every axis: its distributions, its pictures beside training, and its figures."""
-    yield from ("## OOD axes", "")
+    yield from _heading("OOD axes", (), "axes")
     pairs = {pair.axis: pair for pair in made.pairs} if made else {}
-    measured = all_axes.of_task(task.name)
     for axis in task.axes.values():
         yield from (f"### {axis.name}", "", " ".join(axis.why.split()), "")
         for name, dist in axis.replace.items():
@@ -146,7 +159,8 @@ def _axes(task: Task, made: Exhibit | None) -> Iterator[str]:
         if axis.name in pairs:
             yield from _pair(task, pairs[axis.name])
         cells = measured[axis.name]
-        yield from _details(f"Measured: {cells['verdict']}", ("figure", "value"), cells.items(), "axes")
+        yield from (f"<details><summary>Measured: {html.escape(cells['verdict'])}</summary>", "")
+        yield from (*_table(("figure", "value"), cells.items()), "</details>", "")
 
 
 def _pair(task: Task, pair: Pair) -> Iterator[str]:
@@ -161,22 +175,20 @@ def _pair(task: Task, pair: Pair) -> Iterator[str]:
         yield from (f'<div class="pair">{"".join(figures)}</div>', "")
 
 
-def _certified(task: Task) -> Iterator[str]:
+def certification(task: Task) -> Iterator[str]:
     """Certification of all splits."""
-    yield from ("## Certification", "")
-    found = ledger.latest("certified", task.name)
-    splits = [split for split in task_files.splits(task.name) if split in found]
+    found = figures.certified(task.name)
+    splits = [split for split in (ID, *task.axes) if split in found]
     if not splits:
         yield from (f"Certification: {ledger.not_measured(task.name)}.", "")
         return
-    rows = [(split, *all_axes.certification(task.name, found[split])) for split in splits]
-    yield from _table(("split", *all_axes.CERTIFIED), rows)
-    yield from ("[What the columns mean](../axes.md).", "")
+    rows = [(split, *figures.certification(task.name, found[split])) for split in splits]
+    yield from _table(("split", *figures.CERTIFIED), rows)
 
 
 def _plans(task: Task) -> Iterator[str]:
     """How shortcuts and ablations end in the first training draw of the stored behaviour."""
-    played = _behaviour(task.name).rollouts
+    played = Behaviour.read(task_files.behaviour_file(task.name)).rollouts
     yield from ("## Shortcuts that must fail", "")
     rows = [
         (f"`{name}`", "raw" if raw else "filtered", played[f"{PLAYED}shortcut {name}{raw}"][0])
@@ -196,41 +208,23 @@ def _named(played: Iterable[str], kind: str) -> list[str]:
     return [name.removeprefix(start) for name in played if name.startswith(start)]
 
 
-@cache
-def _behaviour(task: str) -> Behaviour:
-    return Behaviour.read(task_files.shipped("conf") / "behaviour" / f"{task}.json")
-
-
-def _attacks(task: Task) -> Iterator[str]:
+def attacks(task: Task) -> Iterator[str]:
     """Results of the adversary."""
-    yield from ("## Attacks", "")
-    cells = attack_all.of_task(task.name)
-    if cells:
-        told = f"{cells['refuting']} ways around the task in {cells['rollouts']} rollouts"
-        yield from _details(told, ("tier", "hits"), cells.items(), "attacks")
+    if report := figures.attack(task.name):
+        cells = dict(zip(figures.ATTACK, figures.attack_cells(report), strict=True))
+        yield from (f"{cells['refuting']} ways around the task in {cells['rollouts']} rollouts:", "")
+        yield from _table(("tier", "hits"), cells.items())
     else:
         yield from (f"The adversary has not attacked this task: {ledger.not_measured(task.name)}.", "")
 
 
-def _policies(task: Task) -> Iterator[str]:
+def policies(task: Task) -> Iterator[str]:
     """Success of trained policies."""
-    yield from ("## Trained policies", "")
-    table = baselines_page.of_task(task.name)
-    if table:
-        yield from (table, "[What the columns mean](../baselines.md).", "")
+    if rows := [*figures.policies(task)]:
+        yield from _table(figures.POLICY, rows)
     else:
         yield from (f"Trained policies: {ledger.not_measured(task.name)}.", "")
 
 
-def _details(summary: str, head: tuple[str, str], rows: Iterable[tuple[str, str]], about: str) -> Iterator[str]:
-    """A table that opens when its summary is clicked."""
-    yield from (f"<details><summary>{html.escape(summary)}</summary>", "")
-    yield from _table(head, rows)
-    yield from (f"[What the figures mean](../{about}.md).", "", "</details>", "")
-
-
-def _table(head: tuple[str, ...], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    yield f"| {' | '.join(head)} |"
-    yield "|---" * len(head) + "|"
-    yield from (f"| {' | '.join(row)} |" for row in rows)
-    yield ""
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    yield figures.table(head, rows)
