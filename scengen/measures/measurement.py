@@ -1,8 +1,9 @@
 """A kind of measurement: what it measures of a task, and the loop that measures what the ledger lacks."""
 
+import multiprocessing
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
-from itertools import count
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,7 +12,6 @@ from ..evidence import ledger, measuring
 from ..evidence.ledger import Evidence, Kind
 from ..samplers.split import ID
 from ..samplers.task import Task
-from ..work.parallel import each
 
 Command = Callable[[Sequence[str]], int]
 """Function that runs a command line of scengen and returns its exit status."""
@@ -196,8 +196,7 @@ def measure(
     if jobs:
         progress(0, len(jobs), None)
         measurement.prepare(list({job.task.name: job.task for job in jobs}.values()))
-    workers = 1 if measurement.COMMANDS else min(measurement.workers, max(1, len(jobs)))
-    for number, result in zip(count(1), each(_Attempt(measurement), jobs, workers)):
+    for number, result in enumerate(_results(measurement, jobs), 1):
         for row in result.rows:
             made_with = {**result.job.made_with, **result.made_with}
             measuring.keep(result.job.task, row.split, measurement.KIND, row.n, row.value, made_with)
@@ -206,14 +205,20 @@ def measure(
     return found
 
 
-@dataclass(frozen=True)
-class _Attempt:
-    """Function that runs a job. An error fails the job alone: one axis without a feasible twin must not end the run."""
+def _results(measurement: Measurement, jobs: Sequence[Job]) -> Iterator[Result]:
+    """The results of jobs as they finish."""
+    if measurement.COMMANDS or measurement.workers == 1 or len(jobs) < 2:
+        yield from (_result(measurement, job) for job in jobs)
+        return
+    # Unlike the workers of `work.parallel`, these processes may have children: certification has them for its limits.
+    with ProcessPoolExecutor(measurement.workers, multiprocessing.get_context("spawn")) as executor:
+        started = [executor.submit(_result, measurement, job) for job in jobs]
+        yield from (future.result() for future in as_completed(started))
 
-    measurement: Measurement
 
-    def __call__(self, job: Job) -> Result:
-        try:
-            return self.measurement.result(job)
-        except ScengenError as error:
-            return Result(job, words=str(error), passed=False)
+def _result(measurement: Measurement, job: Job) -> Result:
+    """Run a job. An error fails the job alone: one axis without a feasible twin must not end the run."""
+    try:
+        return measurement.result(job)
+    except ScengenError as error:
+        return Result(job, words=str(error), passed=False)

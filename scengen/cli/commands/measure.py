@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 
 from ... import compose
-from ...errors import UnknownName
+from ...errors import BadConfig, UnknownName, cut
 from ...evidence import ledger
 from ...measures.kinds import MEASUREMENTS
 from ...measures.measurement import Result, check_splits, measure, options_of
@@ -12,7 +12,7 @@ from ...samplers.task_files import search_path
 from ...work.limits import at_least
 from ..program import run
 from . import FAILED, OK, Arguments, err, say, warn
-from .settings import read
+from .settings import read, task_overrides
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,8 @@ COMMON = ("kind", "splits", "fresh", "workers", "records", "to")
 
 
 def command(arguments: Arguments) -> int:
+    if changed := task_overrides(arguments):
+        raise BadConfig(f"{cut(changed[0])}: figures are about a task as its file defines it; change the file")
     settings = read("measure", [word for word in arguments if not word.startswith("task=")], MeasureSettings)
     at_least(settings, workers=1)
     if settings.kind not in MEASUREMENTS:
