@@ -2,9 +2,9 @@
 
 import importlib
 import re
-import sys
 
 import build_docs
+import docstrings
 import pytest
 import tables
 
@@ -12,10 +12,6 @@ from scengen import list_tasks, load_task
 from scengen.site import task_page
 
 ROOT = build_docs.ROOT
-sys.path.insert(0, str(ROOT / "docs"))
-
-import docstrings
-
 PAGES = [path for pattern in build_docs.WRITTEN for path in sorted(ROOT.glob(pattern))]
 MOST_WORDS = 30_000
 """Number of words that docs/ may hold: people write them, and people have to keep them true."""
@@ -66,7 +62,7 @@ def test_the_page_of_a_task_tells_everything_about_it():
     for told in ("| `gap_ratio` | tile widths |", "### wide_gaps", "| `push_the_slab` | raw | failure", "refuting"):
         assert told in text
     links = [link for link in build_docs.LINK.findall(text) if "://" not in link]
-    assert len(links) > 10 and all((ROOT / "docs" / "tasks" / link).exists() for link in links)
+    assert len(links) > 5 and all((ROOT / "docs" / "tasks" / link).exists() for link in links)
 
 
 def test_links_lead_from_stored_page_to_stored_page():

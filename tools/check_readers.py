@@ -204,7 +204,7 @@ def page(found: Sequence[Found], pythons: Mapping[str, Path]) -> str:
     lines = [
         "# Recordings in the readers of others",
         "",
-        "<!-- Written by tools/check_readers.py; make readers -->",
+        "<!-- Written by `make readers` -->",
         "",
         f"`make readers` makes demonstrations of {len(TASKS)} tasks, {EPISODES} each, and records them with "
         "`rates=native`, the first with a camera, and for robomimic. It opens them in environments of their own: "

@@ -68,7 +68,8 @@ class Attacks(_Searches):
         value["hits"] = [hit for hit in report["hits"] if hit["refutes"]]
         value["cpu"] = _cpu(folder / "attack.jsonl")
         refuted = bool(report["lost"]) or (bool(value["hits"]) and rules == STRICT)
-        return Result(job, [Row(ID, len(report["scenarios"]), value)], passed=not refuted)
+        words = f"{report['rollouts']} rollouts, {len(value['hits'])} ways around, {len(report['lost'])} lost"
+        return Result(job, [Row(ID, len(report["scenarios"]), value)], words, not refuted)
 
 
 def has_strict_rules(task: Task) -> bool:

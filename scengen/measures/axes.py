@@ -41,7 +41,7 @@ class Cards(_OfAxes):
         settings = (f"n={n}", f"workers={self.workers}", f"to={folder}")
         self.finish("axis", "card", f"task={task.name}", f"axis={axis}", *settings)
         card = read_card(folder / "card.json")
-        return Result(job, [Row(axis, n, _of_card(card))])
+        return Result(job, [Row(axis, n, _of_card(card))], f"{folder / 'card.html'}")
 
 
 def _of_card(card: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,11 +12,21 @@ from ..errors import BadConfig
 from ..evidence.ledger import Evidence
 from ..samplers.split import ID
 from ..samplers.task import Task
+from ..samplers.task_files import facts_file
 from ..validate.rebuilt import world_of
 from .measurement import Job, Measurement, Result, Row
 from .scenarios import feasible
 
-RIGHT, OPTIONAL, MISSING, ORDER, WRONG = "right", "with optional ones", "missing", "wrong order", "wrong sub-goal"
+RIGHT = "right"
+"""Kind of plan: the required sub-goals in a right order."""
+OPTIONAL = "with optional ones"
+"""Kind of plan: all sub-goals in a right order."""
+MISSING = "missing"
+"""Kind of plan: a required sub-goal is left out."""
+ORDER = "wrong order"
+"""Kind of plan: two neighbours that have an order are exchanged."""
+WRONG = "wrong sub-goal"
+"""Kind of plan: a wrong sub-goal ends it."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +85,7 @@ class Priors(Measurement):
     """How often the best fixed answers of n training draws are right in n other ones.
 
     A model that sees nothing cannot do better. Each question whose answers differ in training is measured: its share of
-    right answers in the draws that the answer is from, and in the others.
+    right answers in the draws that the answer is from, and in the others. Tasks without questions are left out.
     """
 
     KIND = "prior"
@@ -88,6 +98,9 @@ class Priors(Measurement):
 
     def answers(self, row: Evidence, job: Job) -> bool:
         return row.n >= self.options["n"]
+
+    def jobs(self, task: Task) -> Iterator[Job]:
+        return super().jobs(task) if facts_file(task.name, self.search) else iter(())
 
     def result(self, job: Job) -> Result:
         task, n = job.task, self.options["n"]

@@ -3,7 +3,6 @@
 import json
 import venv
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -28,7 +27,6 @@ from scengen.validate.verify.stored import settings_of_manifest
 from scengen.work.fingerprint import fingerprint
 from scengen.work.parallel import Limits
 
-ROOT = Path(__file__).parents[2]
 HERE = mujoco.__version__
 LIMITS = Limits(300.0, 4000)
 

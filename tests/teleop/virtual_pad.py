@@ -1,6 +1,7 @@
 """A gamepad without hardware: SDL's virtual joystick, through the library that pygame has loaded.
 
-`python tests/teleop/virtual_pad.py` measures how long an event takes from the pad to the robot, and how regular the loop is.
+`python tests/teleop/virtual_pad.py` measures how long an event takes from the pad to the robot, and how
+regular the loop is.
 """
 
 import ctypes
