@@ -93,6 +93,7 @@ def test_more_twins_replace_fewer(tmp_path, monkeypatch):
         (["kind=training", "compare=wrenches"], "did you mean 'wrench'"),
         (["kind=prior", "task.horizon=3"], "figures are about a task as its file defines it"),
         ([], "measure needs kind=..."),
+        (["kind=belief", "records=README.md"], "README.md is a file; name a folder"),
     ],
 )
 def test_bad_settings_end_in_one_line(words, says, capsys, tmp_path):

@@ -10,6 +10,7 @@ from ...measures.measurement import Result, check_splits, measure, options_of
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
 from ...work.limits import at_least
+from ...work.targets import try_folder
 from ..program import run
 from . import FAILED, OK, Arguments, err, say, warn
 from .settings import read, task_overrides
@@ -42,9 +43,13 @@ COMMON = ("kind", "splits", "fresh", "workers", "records", "to")
 
 def command(arguments: Arguments) -> int:
     if changed := task_overrides(arguments):
-        raise BadConfig(f"{cut(changed[0])}: figures are about a task as its file defines it; change the file")
+        raise BadConfig(
+            f"{cut(changed[0])}: figures are about a task as its file defines it; leave it out, or change the file"
+        )
     settings = read("measure", [word for word in arguments if not word.startswith("task=")], MeasureSettings)
     at_least(settings, workers=1)
+    for folder in (settings.records, settings.to):
+        try_folder(folder)
     if settings.kind not in MEASUREMENTS:
         raise UnknownName("kind of measurement", settings.kind, MEASUREMENTS)
     search, kind = search_path(arguments), MEASUREMENTS[settings.kind]
