@@ -211,9 +211,12 @@ def _results(measurement: Measurement, jobs: Sequence[Job]) -> Iterator[Result]:
         yield from (_result(measurement, job) for job in jobs)
         return
     # Unlike the workers of `work.parallel`, these processes may have children: certification has them for its limits.
-    with ProcessPoolExecutor(measurement.workers, multiprocessing.get_context("spawn")) as executor:
+    executor = ProcessPoolExecutor(measurement.workers, multiprocessing.get_context("spawn"))
+    try:
         started = [executor.submit(_result, measurement, job) for job in jobs]
         yield from (future.result() for future in as_completed(started))
+    finally:
+        executor.shutdown(wait=False, cancel_futures=True)  # an interrupted command does not wait for jobs
 
 
 def _result(measurement: Measurement, job: Job) -> Result:
