@@ -5,14 +5,14 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations axes beliefs attacks drift baselines curves docs docs-links results pictures site reference bench clean checker checker-base mutants behaviour behaviour-check tag
+.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations figures axes beliefs attacks drift baselines curves docs docs-links results pictures site reference bench clean checker checker-base mutants behaviour behaviour-check tag
 
 setup: $(READY)
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(ENV)
-	@sh tools/install.sh $(BIN)/python
-	@sh tools/opengl.sh
+	@sh tools/setup.sh python $(BIN)/python
+	@sh tools/setup.sh opengl
 	$(BIN)/python -c "from scengen.work.fingerprint import fingerprint; fingerprint()"  # compiles the control loop
 	@touch $(READY)
 
@@ -28,7 +28,7 @@ demo: setup
 OOD_TASKS := sheltered_grasp pendulum_grasp domino_single tool_retrieve occluder_push slip_recovery balance_medium keyboard_typing
 OOD_SPLITS := opposite_side plane_45 diagonal mirrored_hook stacked_lids two_slips turned unseen_words
 ci:
-	@sh tools/chromium.sh
+	@sh tools/setup.sh chromium
 	$(MAKE) check
 	$(MAKE) test
 	$(MAKE) slow
@@ -47,7 +47,7 @@ wheel:
 	$(PYTHON) -m venv $(WHEEL)/env
 	$(WHEEL)/env/bin/pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir $(WHEEL) .
 	$(WHEEL)/env/bin/pip install --quiet --disable-pip-version-check --constraint constraints.txt "$$(ls $(WHEEL)/*.whl)[all]"
-	cd $(WHEEL) && sh $(CURDIR)/tools/try_wheel.sh
+	cd $(WHEEL) && sh $(CURDIR)/tools/setup.sh wheel
 
 # Tests that take some seconds each, and the stored behaviour of every task (10 minutes). Many wait, hence three at a time.
 slow: setup
@@ -89,13 +89,31 @@ format: setup
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-# Certifies N scenarios of every split of every task at level full (hours). SPLITS=id selects the training splits,
-# TASKS=packing some tasks.
-N ?= 20
-SPLITS ?=
+# Measurements below are commands of scengen that fill records/: scengen help measure explains them. An interrupted one is continued.
+# TASKS="packing edge_slide" selects tasks, WORKERS=4 the number of processes.
 TASKS ?=
+SPLITS ?=
+WORKERS ?= 2
+empty :=
+comma := ,
+list = $(subst $(empty) $(empty),$(comma),$(strip $(1)))
+of_tasks = $(if $(TASKS),task=$(call list,$(TASKS)))
+MEASURE = $(BIN)/scengen measure workers=$(WORKERS) $(of_tasks)
+
+# Certifies N scenarios of every split of every task at level full (hours), into a ledger of this commit, which continues it; code that
+# is not committed is certified anew. SPLITS=id selects splits.
+N ?= 20
 certify: setup
-	$(BIN)/python tools/certify_all.py $(N) $(TASKS) $(SPLITS)
+	$(MEASURE) kind=certified level=full n=$(N) draws=0 replays=0 $(if $(SPLITS),splits=[$(call list,$(SPLITS))]) \
+		records=generated/certify/$$(git rev-parse HEAD) fresh=$$(git diff --quiet HEAD && echo false || echo true)
+
+# Measures certification, sub-goals and questions, as the documentation shows them, and plays the cheats of people (hours).
+figures: setup
+	$(MEASURE) kind=certified
+	$(MEASURE) kind=plan
+	$(MEASURE) kind=prior
+	$(BIN)/python tests/attack/recall.py play $(TASKS)
+	$(BIN)/python tools/build_docs.py results
 
 # Runs the quick tests and certifies one scenario of each task under other versions of Python, MuJoCo and numpy (hours).
 # STACKS=mujoco4-python3.13 selects stacks.
@@ -116,57 +134,52 @@ readers: setup
 # or actions. INTEGRATIONS=vla_eval_scengen selects packages. LeRobot needs Python 3.12 and gigabytes.
 INTEGRATIONS ?=
 integrations: setup
-	$(BIN)/python tools/check_integrations.py $(INTEGRATIONS)
+	$(BIN)/python tools/stacks.py integrations $(INTEGRATIONS)
 
-# Makes the card of every axis (hours). AXES holds settings of scengen axis card, and names of tasks to select them.
-AXES ?= n=50
+# Makes the card of every axis with TWINS twins (hours).
+TWINS ?= 50
 axes: setup
-	$(BIN)/python tools/all_axes.py $(AXES)
-	$(BIN)/python tools/results.py
+	$(MEASURE) kind=axis n=$(TWINS)
+	$(BIN)/python tools/build_docs.py results
 
-# Plays planners with beliefs of training on TWINS twins of every axis without a record (an hour). TASKS=packing selects tasks.
-# An interrupted call is continued.
-TWINS ?= 8
+# Plays planners with beliefs of training on 8 twins of every axis without a record (an hour).
 beliefs: setup
-	$(BIN)/python tools/beliefs.py n=$(TWINS) $(TASKS)
-	$(BIN)/python tools/results.py
+	$(MEASURE) kind=belief
+	$(BIN)/python tools/build_docs.py results
 
-# Searches observations for hidden parameters, and attacks every task with BUDGET rollouts (an hour). TASKS=packing selects tasks.
+# Searches observations for hidden parameters, and attacks every task with BUDGET rollouts (an hour).
 BUDGET ?= 500
 attacks: setup
-	$(BIN)/python tools/leaks_all.py $(TASKS)
-	$(BIN)/python tools/attack_all.py $(BUDGET) $(TASKS)
-	$(BIN)/python tools/results.py
+	$(MEASURE) kind=leak
+	$(MEASURE) kind=attack budget=$(BUDGET)
+	$(BIN)/python tools/build_docs.py results
 
-# Compares verdicts under several VERSIONS of MuJoCo (hours). Uses N scenarios of the pools in POOLS and makes
-# missing ones. TASKS=packing selects tasks. An interrupted comparison is continued. The environments come from the package index.
-POOLS ?= generated/drift
+# Compares verdicts under several VERSIONS of MuJoCo (hours). Missing pools are made in generated/drift. The environments come from the
+# package index.
 VERSIONS ?= 3.5.0,4.0.0
 drift: setup
-	$(BIN)/python tools/drift_all.py $(N) $(POOLS) $(VERSIONS) $(TASKS)
+	$(MEASURE) kind=drift mujoco=[$(VERSIONS)]
 
-# Trains and evaluates small policies (about half an hour of processor time for each task). TASKS=packing
-# selects tasks. An interrupted call is continued.
+# Trains and evaluates small policies (about half an hour of processor time for each task). curves trains with three seeds on 25 to 100
+# demonstrations (half an hour for each task), on other styles, and on spoiled, curated and random ones (a quarter of an hour for each
+# task), and with the wrench.
+BASELINES := domino_single mirror_pick_place linear_intercept pendulum_grasp edge_slide tool_retrieve pick_place_ycb slip_recovery \
+	balance_medium cube_toss domino_select bounce_intercept
+baselines: TASKS := $(or $(TASKS),$(BASELINES))
 baselines: setup
-	$(BIN)/python tools/baselines.py $(TASKS)
-	$(BIN)/python tools/results.py
+	$(MEASURE) kind=baseline
+	$(BIN)/python tools/build_docs.py results
 
-# Trains with three seeds on 25 to 100 demonstrations (half an hour for each task), on other styles, and on spoiled, curated and random
-# ones (a quarter of an hour for each task), and with the wrench (mass_sort). WORKERS=4 trains at once.
-WORKERS ?= 1
 curves: setup
-	$(BIN)/python tools/trainings.py curves workers=$(WORKERS) $(TASKS)
-	$(BIN)/python tools/trainings.py styles workers=$(WORKERS) $(TASKS)
-	$(BIN)/python tools/trainings.py curation workers=$(WORKERS) $(TASKS)
-	$(BIN)/python tools/trainings.py wrench workers=$(WORKERS)
+	$(BIN)/scengen measure kind=training workers=$(WORKERS) task=$(call list,$(or $(TASKS),$(BASELINES))) compare=curves
+	$(BIN)/scengen measure kind=training workers=$(WORKERS) task=$(call list,$(or $(TASKS),tool_retrieve edge_slide balance_medium)) compare=styles
+	$(BIN)/scengen measure kind=training workers=$(WORKERS) task=$(call list,$(or $(TASKS),tool_retrieve edge_slide balance_medium)) compare=curation
+	$(BIN)/scengen measure kind=training workers=$(WORKERS) task=mass_sort compare=wrench
 
 # Builds the documentation into build/docs/html: the pages of docs/, and those that are generated from the code and the ledger. A warning,
 # such as a link that leads nowhere, is an error. FILMS=1 adds films in three dimensions to the pages of tasks (half an hour of processor time
 # for all; TASKS=packing makes some). Films that are up to date are kept. docs-links also tries the links to other hosts.
 FILMS ?=
-empty :=
-comma := ,
-of_tasks = $(if $(TASKS),task=$(subst $(empty) $(empty),$(comma),$(strip $(TASKS))))
 docs: setup
 	$(if $(FILMS),$(BIN)/scengen site to=build/docs/extra/films $(of_tasks))
 	$(BIN)/python tools/build_docs.py
@@ -176,11 +189,11 @@ docs-links: setup
 
 # Writes docs/results.md, the headline figures, from the ledger.
 results: setup
-	$(BIN)/python tools/results.py
+	$(BIN)/python tools/build_docs.py results
 
 # Writes the pictures of docs/tasks and docs/scenes.webp (needs OpenGL). TASKS=packing selects tasks.
 pictures: setup
-	$(BIN)/python tools/task_pictures.py $(TASKS)
+	$(BIN)/python tools/pictures.py strips $(TASKS)
 
 # Writes the films alone, as a web site of tasks, into SITE. TASKS=packing makes some tasks. An interrupted call is continued.
 SITE ?= generated/site

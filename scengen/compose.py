@@ -145,6 +145,17 @@ def chosen_task(verb: str, overrides: Sequence[str]) -> str | None:
     return composed(verb, overrides)[1].get("task")
 
 
+def chosen_tasks(verb: str, overrides: Sequence[str]) -> list[str]:
+    """Names of the tasks that a command line chooses, for a command that accepts several: all if it chooses none.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    named = [text for text in overrides if text.startswith("task=")] or [f"task={ALL}"]
+    asked = combinations(verb, [*named, *search_path(overrides)])
+    return [name for one in asked if (name := chosen_task(verb, one.overrides))]
+
+
 def config_dir(verb: str) -> Path:
     """The folder in which Hydra finds the file of a command and the groups from which it chooses files.
 
@@ -204,7 +215,7 @@ def _logging_restored() -> Iterator[None]:
 
 MAX_DEPTH = 20
 """Largest nesting of lists and groups in an override: more than any file of conf/ needs."""
-LISTS = ("pool", "cameras", "mujoco", "apart", "data", "styles")
+LISTS = ("pool", "cameras", "mujoco", "apart", "data", "styles", "splits")
 """Settings for which several values are a list and not a sweep. `keep` is always a list."""
 
 

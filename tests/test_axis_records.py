@@ -2,14 +2,13 @@
 
 import json
 
-import all_axes
-import axis_records
 import predictors
 import pytest
 
 from scengen import load_task
 from scengen.errors import BadConfig
 from scengen.evidence import ledger, measuring
+from scengen.measures import figures
 from scengen.ood.axis_card import FORMAT, read_card
 from scengen.ood.baseline import Baseline
 
@@ -22,7 +21,7 @@ def test_each_axis_on_which_card_and_learner_disagree_is_explained():
     listed = {tuple(line.split(" | ")[:2]) for line in told.splitlines() if line.startswith("| ")}
     listed -= {("| task", "axis"), ("| ---", "---")}
     explained = {(f"| {task}", axis) for task, axis in predictors.EXCEPTIONS}
-    cards = {(f"| {task}", axis) for task, axis in predictors.EXCEPTIONS if axis in axis_records.cards(load_task(task))}
+    cards = {(f"| {task}", axis) for task, axis in predictors.EXCEPTIONS if axis in figures.cards(task)}
     assert cards <= listed <= explained, "an explanation may wait for a card"
 
 
@@ -33,14 +32,14 @@ def found(name, training, here, of=8):
 @pytest.fixture
 def empty(tmp_path, monkeypatch):
     """A ledger without rows."""
-    monkeypatch.setattr(ledger, "folder", lambda: tmp_path)
+    monkeypatch.setattr(ledger, "folder_of", lambda task: tmp_path)
 
 
 def test_the_measurement_with_more_twins_counts(empty):
     for kind, of in (("axis", 20), ("belief", 8)):
         value = {"baselines": [found("belief", 5, 2, of).record]}
         measuring.keep(TASK, "diagonal", kind, of, value, {"n": of})
-    assert axis_records.baselines(TASK)["diagonal"]["belief"].twins == 20
+    assert figures.baselines(TASK)["diagonal"]["belief"].twins == 20
 
 
 def learned(policy, split, solved, seed=0, first=0):
@@ -53,23 +52,23 @@ def test_the_learner_is_the_policy_that_works_best_in_training(empty):
     for policy, *both in (("knn", 5, 0), ("mip", 9, 2), ("bc", 9, 1)):
         for split, solved in zip(("id", "diagonal"), both, strict=True):
             learned(policy, split, solved)
-    best = axis_records.learners(TASK)["diagonal"]
+    best = figures.learners(TASK)["diagonal"]
     assert (best.name, best.twins, best.finding) == ("bc", 10, "breaks"), "of equals, the first one"
 
 
 def test_a_learner_that_has_played_no_twins_is_not_paired(empty):
     learned("bc", "id", 9)
     learned("bc", "diagonal", 1, first=10)
-    apart = axis_records.learners(TASK)["diagonal"]
+    apart = figures.learners(TASK)["diagonal"]
     assert apart.twins == 0 and apart.excess.value == pytest.approx(0.8)
-    assert all_axes._baseline(apart).endswith("unpaired")
+    assert figures.baseline_cell(apart).endswith("unpaired")
 
 
 def test_a_learner_is_judged_by_all_its_trainings(empty):
     for seed, solved in enumerate((0, 3, 6)):
         learned("bc", "id", 9, seed)
         learned("bc", "diagonal", solved, seed)
-    best = axis_records.learners(TASK)["diagonal"]
+    best = figures.learners(TASK)["diagonal"]
     assert (best.twins, best.training.value, best.here.value) == (10, 0.9, pytest.approx(0.3))
     assert best.here.rollouts == 30, "clusters of three"
 

@@ -12,7 +12,7 @@ import pytest
 from helpers import REFERENCE
 from hypothesis import given
 from hypothesis import strategies as st
-from synthetic_pool import synthetic
+from large_pools import synthetic
 
 from scengen import cli
 from scengen.cli import tables as report
@@ -254,9 +254,9 @@ finally:
 @pytest.mark.slow
 def test_thirty_thousand_rows_stay_within_memory(tmp_path):
     """Written, looked at and played. Rows that are kept would take 60 kB each: 1800 MB."""
-    tool, folder, played = Path(__file__).parents[1] / "tools" / "synthetic_pool.py", tmp_path / "pool", tmp_path / "e"
+    tool, folder, played = Path(__file__).parents[1] / "tools" / "large_pools.py", tmp_path / "pool", tmp_path / "e"
     for command in (
-        [str(tool), str(REFERENCE), "30000", str(folder)],
+        [str(tool), "write", str(REFERENCE), "30000", str(folder)],
         ["-m", "scengen", "show", f"pool={folder}"],
         ["-m", "scengen", "compare", f"pool={folder}"],
         ["-m", "scengen", "evaluate", f"pool={folder}", "policy=idle", "seeds=1", "rollouts=1", f"to={played}"],

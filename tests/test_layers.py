@@ -28,6 +28,7 @@ LAYERS = (
     ("evaluate",),
     ("agents", "ood"),
     ("demos", "conformance"),
+    ("measures",),
     ("cli", "studio"),
     ("site", "__init__", "__main__"),
 )
@@ -35,7 +36,7 @@ LAYERS = (
 WINGS = {
     "core": """errors geometry installation compat html_tables orientation params physics symmetry robots control sim
         assets predicates scenario episode skills samplers tasks work compose""",
-    "proof": "certificate validate attack evidence conformance",
+    "proof": "certificate validate attack evidence conformance measures",
     "data": "pool runs demos export intake",
     "study": "learn evaluate ood agents bench drift",
     "face": "pictures envs studio site cli __init__ __main__",

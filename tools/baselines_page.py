@@ -1,16 +1,25 @@
 """The tables and plots of docs/baselines.md, from the ledger."""
 
 import json
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from itertools import product
 from typing import Any
 
-import axis_records
-import baseline_plots
+import matplotlib
 import numpy as np
-from baselines import (
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from scengen import list_tasks, load_task
+from scengen.evaluate.statistics import paired
+from scengen.evidence import ledger
+from scengen.evidence.ledger import Evidence
+from scengen.learn.models import BC
+from scengen.learn.train import TrainSettings
+from scengen.measures import figures
+from scengen.measures.figures import SHOWN, table, trainings_of
+from scengen.measures.policies import (
     ALL,
     BLIND,
     CURATED,
@@ -20,24 +29,32 @@ from baselines import (
     NOMINAL,
     POLICIES,
     RANDOM,
-    REPLAY,
     SCENARIOS,
-    TASKS,
-    UNTRAINED,
     VARIED,
 )
-
-from scengen import list_tasks, load_task
-from scengen.evaluate.statistics import paired, rate
-from scengen.evidence import ledger
-from scengen.evidence.ledger import Evidence
-from scengen.learn.models import BC, MIP
-from scengen.learn.train import TrainSettings
+from scengen.pictures.plots import svg_bytes
 from scengen.samplers.split import ID
 
-SHOWN = (*POLICIES, REPLAY)
-"""Policies that are played on axes, too."""
-COLUMNS = ("task", "split", "policy", "solved", "rate [%]", "why not")
+Rates = Mapping[str, Mapping[str, Sequence[float]]]
+"""Solved scenarios [%] of each training, by policy and split."""
+Point = tuple[int, float, float]
+"""Point of a learning curve: a number of demonstrations, and the solved scenarios in training and on axes [%]."""
+PLOTS = 3
+"""Number of tasks in a row."""
+WIDTH = 4.0
+"""Width of the plot of a task [in]."""
+LINE = 0.24
+"""Height of the line of an axis [in]."""
+APART = 0.2
+"""Distance of the marks of different policies on a line [lines]."""
+AROUND = 0.7
+"""Height of the title and the labels of a plot [in]."""
+CURVES = 1.8
+"""Height of the learning curves of a task [in]."""
+COLORS = ("#0b6e99", "#c4500c", "#6f6f6f", "#a9a9a9")
+"""Colors of the policies."""
+MARKERS = "os^x"
+"""Markers of the policies."""
 
 
 def fills() -> dict[str, str]:
@@ -57,8 +74,8 @@ def fills() -> dict[str, str]:
 def plots() -> dict[str, bytes]:
     """The plots of the page: names of files, and SVG."""
     return {
-        "baselines_axes.svg": baseline_plots.axes(_rates()),
-        "baselines_curves.svg": baseline_plots.curves(_curves()),
+        "baselines_axes.svg": axes_plot(_rates()),
+        "baselines_curves.svg": curves_plot(_curves()),
     }
 
 
@@ -71,23 +88,17 @@ def means(task: str) -> dict[str, tuple[float, float]]:
     }
 
 
-def of_task(task: str) -> str:
-    """The table of all splits of a task; nothing if none is measured."""
-    lines = _lines(task)
-    return _table(COLUMNS[1:], [line.partition(" | ")[2] for line in lines]) if lines else ""
-
-
 @cache
-def _rates() -> dict[str, baseline_plots.Rates]:
+def _rates() -> dict[str, Rates]:
     """Solved scenarios [%] of each training of each policy in training and on all axes, by task.
 
     Tasks that not all of these policies have played are left out.
     """
-    found = dict[str, baseline_plots.Rates]()
+    found = dict[str, Rates]()
     for task, rows in _measured().items():
         splits = (ID, *load_task(task).axes)
         rates = {
-            policy: {split: [_percent(one) for one in _chosen(rows, policy, split)] for split in splits}
+            policy: {split: [_percent(one) for one in trainings_of(rows, policy, split)] for split in splits}
             for policy in SHOWN
         }
         if all(solved for known in rates.values() for solved in known.values()):
@@ -102,12 +113,6 @@ def _measured() -> dict[str, list[Evidence]]:
     return {task: rows for task, rows in every.items() if rows}
 
 
-def _chosen(rows: Iterable[Evidence], policy: str, split: str) -> list[Evidence]:
-    """The rows of a policy on a split, one for each training, by seed."""
-    chosen = [row for row in rows if row.split == split and row.has(policy=policy)]
-    return sorted(chosen, key=lambda row: row.made_with.get("seed", 0))
-
-
 def _percent(row: Evidence) -> float:
     return 100.0 * row.value["solved"] / row.n
 
@@ -117,40 +122,23 @@ def _summary() -> str:
     lines, every, count = [], [], 0
     for task in _rates():
         own, axes = [*means(task).values()], len(load_task(task).axes)
-        lines.append(f"| [{task}](tasks/{task}.md) | {axes} | {' | '.join(map(_arrow, own))} |")
+        lines.append([f"[{task}](tasks/{task}.md)", str(axes), *map(_arrow, own)])
         every.append(own)
         count += axes
-    lines.append(f"| **mean** | {count} | {' | '.join(map(_arrow, np.mean(every, axis=0)))} |")
-    return _table(("task", "axes", *SHOWN), lines)
+    lines.append(["**mean**", str(count), *map(_arrow, np.mean(every, axis=0))])
+    return table(("task", "axes", *SHOWN), lines)
 
 
 def _arrow(rates: Sequence[Any]) -> str:
     return " → ".join(f"{rate:.0f}" for rate in rates)
 
 
-def _missing() -> list[str]:
-    """Tasks that are measured by default, and whose present version was not."""
-    return [task for task in TASKS if task not in _measured()]
-
-
 def _all_splits() -> str:
     """The table with a line for each split and policy."""
-    lines = [line for task in _measured() for line in _lines(task)]
-    lines += [f"| [{task}](tasks/{task}.md) | {' | '.join([ledger.not_measured(task)] * 5)} |" for task in _missing()]
-    return _table(COLUMNS, lines)
-
-
-def _lines(task: str) -> list[str]:
-    """The lines of a task: one for each split and policy."""
-    rows = _measured().get(task, [])
-    played = (
-        _chosen(rows, policy, split) for split, policy in product((ID, *load_task(task).axes), (*SHOWN, *UNTRAINED))
-    )
-    return [_line(own) for own in played if own]
-
-
-def _table(columns: Sequence[str], lines: Sequence[str]) -> str:
-    return "\n".join([f"| {' | '.join(columns)} |", "|---" * len(columns) + "|", *lines]) + "\n"
+    rows = [[f"[{task}](tasks/{task}.md)", *line] for task in _measured() for line in figures.policies(load_task(task))]
+    before = [task for task in list_tasks() if task not in _measured() and ledger.read("baseline", task)]
+    rows += [[f"[{task}](tasks/{task}.md)", *[ledger.not_measured(task)] * 5] for task in before]
+    return table(("task", *figures.POLICY), rows)
 
 
 @cache
@@ -169,15 +157,15 @@ def _learning_curves() -> str:
     lines = []
     for task, known in _trainings(MIXED).items():
         for split, policy in product(_splits(task, known), POLICIES):
-            cells = " | ".join(_spread(_learned(task, split, policy, size)) for size in _sizes())
-            lines.append(f"| [{task}](tasks/{task}.md) | {split} | {policy} | {cells} |")
+            cells = (_spread(_learned(task, split, policy, size)) for size in _sizes())
+            lines.append([f"[{task}](tasks/{task}.md)", split, policy, *cells])
     columns = ("task", "split", "policy", *(f"{size} demonstrations" for size in _sizes()))
-    return _table(columns, lines)
+    return table(columns, lines)
 
 
-def _curves() -> dict[str, dict[str, list[baseline_plots.Point]]]:
+def _curves() -> dict[str, dict[str, list[Point]]]:
     """The points of the learning curves of each policy, by task."""
-    found = dict[str, dict[str, list[baseline_plots.Point]]]()
+    found = dict[str, dict[str, list[Point]]]()
     for task, known in _trainings(MIXED).items():
         found[task] = {policy: [] for policy in POLICIES}
         for policy, size in product(POLICIES, _sizes()):
@@ -196,8 +184,8 @@ def _sizes() -> list[int]:
 def _learned(task: str, split: str, policy: str, size: int) -> list[int]:
     """Solved scenarios of each training on so many demonstrations."""
     if size == DEMONSTRATIONS:
-        return [one.value["solved"] for one in _chosen(_measured().get(task, []), policy, split)]
-    rows = _chosen(_trainings(MIXED)[task], policy, split)
+        return [one.value["solved"] for one in trainings_of(_measured().get(task, []), policy, split)]
+    rows = trainings_of(_trainings(MIXED)[task], policy, split)
     return [row.value["solved"] for row in rows if row.has(size=size)]
 
 
@@ -218,15 +206,15 @@ def _worth(*sets: str) -> str:
         if not all(own.values()):
             continue
         for split in _splits(task, known):
-            here = {name: _chosen(own[name], BC, split) for name in sets}
+            here = {name: trainings_of(own[name], BC, split) for name in sets}
             cells = [_spread([row.value["solved"] for row in here[name]]) for name in sets]
             outcomes = {name: [*zip(*(row.value["outcomes"] for row in here[name]), strict=True)] for name in sets}
             for name in others:
                 gain = paired(outcomes[last], outcomes[name])
                 cells.append(f"{100 * gain.value:+.1f} [{100 * gain.low:.1f}, {100 * gain.high:.1f}]")
-            lines.append(f"| [{task}](tasks/{task}.md) | {split} | {' | '.join(cells)} |")
+            lines.append([f"[{task}](tasks/{task}.md)", split, *cells])
     columns = ("task", "split", *sets, *(f"{last} - {name}" for name in others))
-    return _table(columns, lines)
+    return table(columns, lines)
 
 
 def _spread(solved: list[int]) -> str:
@@ -236,16 +224,72 @@ def _spread(solved: list[int]) -> str:
     return f"{sum(solved) / len(solved):.3g} [{min(solved)}, {max(solved)}]"
 
 
-def _line(rows: list[Evidence]) -> str:
-    """The row of a policy on a split, over all its trainings."""
-    first = rows[0]
-    interval = rate([*axis_records.outcomes(rows).values()])
-    reasons = sum((Counter(row.value["reasons"]) for row in rows), Counter[str]())
-    why = "; ".join(f"{number} x {reason}" for reason, number in reasons.most_common(2))
-    shown = f"{100 * interval.value:.0f} [{100 * interval.low:.0f}, {100 * interval.high:.0f}]"
-    solved = ", ".join(str(row.value["solved"]) for row in rows)
-    policy, epochs = first.made_with["policy"], first.made_with.get("epochs")
-    if policy in (BC, MIP) and epochs != TrainSettings().epochs:
-        policy += f", {epochs} epochs"
-    task = f"[{first.task}](tasks/{first.task}.md)"
-    return f"| {task} | {first.split} | {policy} | {solved} of {first.n} | {shown} | {why} |"
+# --- plots ------------------------------------------------------------------------------------
+
+
+def axes_plot(tasks: Mapping[str, Rates]) -> bytes:
+    """The rates on each split, a line of each task's plot for a split, as SVG."""
+    lines = [len(next(iter(rates.values()))) for rates in tasks.values()]
+    rows = [max(lines[first : first + PLOTS]) for first in range(0, len(lines), PLOTS)]
+    figure, plots = _plots(len(tasks), [LINE * row for row in rows])
+    for place, (plot, (task, rates)) in enumerate(zip(plots, tasks.items(), strict=True)):
+        splits = [*next(iter(rates.values()))]
+        for number, (policy, solved) in enumerate(rates.items()):
+            style = {"color": COLORS[number], "zorder": 5 - number}
+            heights = np.arange(len(splits)) + APART * (number - (len(rates) - 1) / 2)
+            means = [np.mean(solved[split]) for split in splits]
+            plot.plot(means, heights, MARKERS[number], markersize=4, label=policy, **style)
+            lowest, highest = ([of(solved[split]) for split in splits] for of in (min, max))
+            plot.hlines(heights, lowest, highest, linewidth=1.2, **style)
+        plot.set_yticks(range(len(splits)), ["in training" if split == ID else split for split in splits])
+        plot.set(title=task, ylim=(rows[place // PLOTS] - 0.5, -0.5), xlim=(-4, 104), xlabel="solved [%]")
+        plot.axhline(0.5, color="black", linewidth=0.6)
+    return _drawn(figure, plots)
+
+
+def curves_plot(tasks: Mapping[str, Mapping[str, Sequence[Point]]]) -> bytes:
+    """The rates over the number of demonstrations, as SVG."""
+    figure, plots = _plots(len(tasks), [CURVES] * -(-len(tasks) // PLOTS))
+    for plot, (task, known) in zip(plots, tasks.items(), strict=True):
+        for number, (policy, curve) in enumerate(known.items()):
+            sizes = [size for size, _, _ in curve]
+            style = {"color": COLORS[number], "marker": MARKERS[number], "markersize": 4}
+            plot.plot(sizes, [here for _, here, _ in curve], "-", label=policy, **style)
+            plot.plot(sizes, [there for _, _, there in curve], "--", **style)
+        plot.set_xscale("log", base=2)
+        ticks = sorted({size for curve in known.values() for size, _, _ in curve})
+        plot.set_xticks(ticks, map(str, ticks))
+        plot.minorticks_off()
+        plot.set(title=task, ylim=(-4, 104), xlabel="demonstrations", ylabel="solved [%]")
+    return _drawn(figure, plots)
+
+
+def _plots(count: int, heights: Sequence[float]) -> tuple[Figure, list[Axes]]:
+    """A figure with a plot for each task.
+
+    Args:
+        heights: height of each row [in].
+    """
+    size = (WIDTH * PLOTS, sum(heights) + AROUND * len(heights))
+    figure = Figure(figsize=size, layout="constrained")
+    made = figure.subplots(len(heights), PLOTS, squeeze=False, height_ratios=heights)
+    plots: list[Axes] = [*made.flat]
+    for plot in plots[count:]:
+        plot.remove()
+    return figure, plots[:count]
+
+
+def _drawn(figure: Figure, plots: Sequence[Axes]) -> bytes:
+    """The finished figure as SVG, with its text as text."""
+    for plot in plots:
+        plot.grid(color="#e5e5e5", linewidth=0.6)
+        plot.set_axisbelow(True)
+        plot.tick_params(length=0, labelsize=8)
+        plot.xaxis.label.set_fontsize(8)
+        plot.yaxis.label.set_fontsize(8)
+        plot.title.set_fontsize(10)
+        plot.spines[["top", "right", "left"]].set_visible(False)
+    handles, labels = plots[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
+    with matplotlib.rc_context({"svg.fonttype": "none", "font.family": "sans-serif"}):
+        return svg_bytes(figure)

@@ -2,13 +2,13 @@
 
     python tools/behaviour.py write [TASK ...]
     python tools/behaviour.py check [changed] [TASK ...]
-    python tools/behaviour.py against COMMIT [n=10] [TASK ...]
+    python tools/behaviour.py against COMMIT [N] [TASK ...]
 
 `write` stores the behaviour of a new task, or of a task whose VERSION has risen. If the version is the stored one,
 only bits may differ; if verdicts, draws, scenes or rules differ, nothing is written, and VERSION has to rise. `check`
 plays all stored rollouts of all splits, kept cheats included; with `changed` only of tasks whose code has another hash
-than at the last check, which it then updates. `against` plays N fresh training draws, whose seed is the commit, here
-and in a work tree of that commit, and compares verdicts and bits.
+than at the last check, which it then updates. `against` plays N fresh training draws (10), whose seed is the commit,
+here and in a work tree of that commit, and compares verdicts and bits.
 """
 
 import json
@@ -21,8 +21,6 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-
-from arguments import parted
 
 from scengen import list_tasks, load_task
 from scengen.errors import ScengenError
@@ -91,8 +89,8 @@ def check(*arguments: str) -> int:
 
 def against(commit: str, *arguments: str) -> int:
     """Compare fresh draws with those of another commit; returns the number of tasks that differ."""
-    names, options = parted(arguments, "n")
-    count, wrong = int(options.get("n") or 10), 0
+    number, names = (arguments[:1], arguments[1:]) if arguments[:1] and arguments[0].isdecimal() else ((), arguments)
+    count, wrong = int(*number) or 10, 0
     seed = int(_git("rev-parse", commit)[:7], 16)
     with work_tree(commit) as tree:
         for name in names or list_tasks():

@@ -1,11 +1,11 @@
 """Builds the documentation into build/docs/html. `make docs`
 
-    python tools/build_docs.py [html | linkcheck]
+    python tools/build_docs.py [html | linkcheck | results]
 
 Hand-written pages come from docs/ and from the READMEs. Generated ones, and the tables of hand-written ones at the
 marks `<!-- generated: NAME -->`, come from the code, the task files and the ledger. Both are written into
 build/docs/source, from which Sphinx (docs/conf.py) makes HTML. If `scengen site` has written build/docs/extra/films,
-the pages of tasks show its films.
+the pages of tasks show its films. `results` writes docs/results.md, the only generated page that is committed.
 
 Pages keep their addresses relative to the repository until they are stored: a link holds on GitHub and in the build.
 """
@@ -17,17 +17,12 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
-import all_axes
-import attack_all
 import baselines_page
-import cluster_page
-import drift_all
-import kept_cheats
-import paper_page
 import predictors
-import task_pages
+import tables
 
-from scengen import list_tasks
+from scengen import list_tasks, load_task
+from scengen.site import task_page
 
 ROOT = Path(__file__).parents[1]
 BUILD = ROOT / "build" / "docs"
@@ -41,13 +36,13 @@ WRITTEN = (
 )
 """Hand-written pages of the repository."""
 FILLS: Mapping[str, Callable[[], Mapping[str, str]]] = {
-    "attacks": attack_all.fills,
-    "axes": all_axes.fills,
+    "attacks": tables.attacks,
+    "axes": tables.axes,
     "baselines": baselines_page.fills,
-    "cluster": cluster_page.fills,
-    "drift": drift_all.fills,
-    "kept_cheats": kept_cheats.fills,
-    "paper": paper_page.fills,
+    "cluster": tables.cluster,
+    "drift": tables.drift,
+    "kept_cheats": tables.kept_cheats,
+    "paper": tables.paper,
     "predictors": predictors.fills,
 }
 """Functions that return the tables of a page of docs/ by the names of their marks."""
@@ -64,6 +59,9 @@ PICTURE = re.compile(r"^docs/tasks/(\w+)\.jpg$")
 
 def main(builder: str = "html") -> None:
     """Write the sources, and run Sphinx. Warnings are errors."""
+    if builder == "results":
+        tables.RESULTS.write_text(tables.results())
+        return
     write_sources(SOURCE, EXTRA / "films")
     EXTRA.mkdir(parents=True, exist_ok=True)
     options = ["--builder", builder, "--fail-on-warning", "--keep-going", "--quiet", "--conf-dir", str(ROOT / "docs")]
@@ -105,7 +103,8 @@ def pages(films: Path | None = None) -> Iterator[tuple[str, str]]:
         for path in sorted(ROOT.glob(pattern)):
             yield path.relative_to(ROOT).as_posix(), written(path)
     for name in list_tasks():
-        yield f"docs/tasks/{name}.md", task_pages.page(name, films if films and films.is_dir() else None)
+        text = task_page.page(load_task(name), tables.of_axes(name), films if films and films.is_dir() else None)
+        yield f"docs/tasks/{name}.md", text
 
 
 def written(path: Path) -> str:

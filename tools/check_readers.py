@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from stacks import found_python
+from stacks import environment_of, found_python
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build" / "readers"
@@ -88,8 +88,9 @@ def main() -> None:
     """Make the recordings, read them, and write the page."""
     pythons = {environment.name: made(environment) for environment in (TRAINERS, DOCTOR)}
     recordings, files = recorded()
-    found = [*by_lerobot(pythons["trainers"], recordings), *by_robomimic(pythons["trainers"], files)]
-    found += [*by_doctor(pythons["doctor"], recordings), *by_lint(pythons["trainers"], recordings)]
+    trainers = pythons["trainers"]
+    found = [*by_trainer(trainers, "lerobot", recordings), *by_trainer(trainers, "robomimic", files)]
+    found += [*by_doctor(pythons["doctor"], recordings), *by_lint(trainers, recordings)]
     unexplained = [one for one in found if one.severity in SHOWN and not reason_of(one)]
     for one in unexplained:
         print(f"{one.severity}: {one.recording}: {one.reader}: {one.check}: {one.message}")
@@ -100,21 +101,10 @@ def main() -> None:
 
 def made(environment: Environment) -> Path:
     """The interpreter of an environment, which is made if it is missing."""
-    folder = FOLDER / environment.name
-    python, ready = folder / "bin" / "python", folder / "ready"
-    wanted = "\n".join([*environment.requirements, *environment.alone])
-    if not ready.is_file() or ready.read_text() != wanted:
-        interpreter = found_python(environment.python)
-        if not interpreter:
-            sys.exit(f"no python{environment.python} for the readers {', '.join(environment.requirements)}")
-        shutil.rmtree(folder, ignore_errors=True)
-        subprocess.run([interpreter, "-m", "venv", folder], check=True)
-        install = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-        subprocess.run([*install, *environment.requirements], check=True)
-        if environment.alone:
-            subprocess.run([*install, "--no-deps", *environment.alone], check=True)
-        ready.write_text(wanted)
-    return python
+    interpreter = found_python(environment.python)
+    if not interpreter:
+        sys.exit(f"no python{environment.python} for the readers {', '.join(environment.requirements)}")
+    return environment_of(FOLDER / environment.name, interpreter, environment.requirements, environment.alone)
 
 
 def recorded() -> tuple[list[Path], list[Path]]:
@@ -147,19 +137,10 @@ def output(words: Sequence[str | Path]) -> str:
     return subprocess.run(words, stdout=subprocess.PIPE, text=True, env=offline).stdout
 
 
-def by_lerobot(python: Path, recordings: Sequence[Path]) -> Iterator[Found]:
-    """Faults that LeRobot's own reader finds."""
-    yield from _of_script(python, "read_lerobot.py", "lerobot", recordings)
-
-
-def by_robomimic(python: Path, files: Sequence[Path]) -> Iterator[Found]:
-    """Faults that robomimic's own reader finds."""
-    yield from _of_script(python, "read_robomimic.py", "robomimic", files)
-
-
-def _of_script(python: Path, script: str, reader: str, paths: Sequence[Path]) -> Iterator[Found]:
+def by_trainer(python: Path, reader: str, paths: Sequence[Path]) -> Iterator[Found]:
+    """Faults that LeRobot's or robomimic's own reader finds."""
     for path in paths:
-        words = [python, ROOT / "tools" / "readers" / script, path]
+        words = [python, ROOT / "tools" / "readers" / "read.py", reader, path]
         ended = subprocess.run(words, capture_output=True, text=True)
         for line in ended.stdout.splitlines():
             if line.startswith("{"):
@@ -223,7 +204,7 @@ def page(found: Sequence[Found], pythons: Mapping[str, Path]) -> str:
     lines = [
         "# Recordings in the readers of others",
         "",
-        "<!-- Written by tools/check_readers.py; make readers -->",
+        "<!-- Written by `make readers` -->",
         "",
         f"`make readers` makes demonstrations of {len(TASKS)} tasks, {EPISODES} each, and records them with "
         "`rates=native`, the first with a camera, and for robomimic. It opens them in environments of their own: "

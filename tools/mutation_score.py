@@ -42,7 +42,7 @@ from scengen.validate.rollout import Jitter, run
 from scengen.validate.settings import Robust
 
 SCENARIOS = 10
-"""Number of scenarios for each mutant, as for a task in tools/attack_all.py."""
+"""Number of scenarios for each mutant, as for a task in `scengen measure kind=attack`."""
 CHEATED = 2
 """Number of these scenarios in which written cheats are played."""
 PLAYED = tuple(tier for tier in TIERS if tier != "shortcut")

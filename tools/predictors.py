@@ -5,17 +5,18 @@ which a learner was tried that works in training.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
-import axis_records
 import numpy as np
 from scipy.stats import mannwhitneyu, rankdata
 
 from scengen import list_tasks, load_task
 from scengen.evaluate.statistics import NORMAL_QUANTILE
 from scengen.evidence import ledger
+from scengen.measures import figures
+from scengen.measures.figures import table
 from scengen.ood.baseline import BELIEF, INCONCLUSIVE, LEARNERS, MOTION, OBJECT_CENTRIC, Baseline, verdict
 
 MIN_AXES = 60
@@ -110,14 +111,14 @@ def _scores() -> str:
             told = "{:+.2f} [{:+.2f}, {:+.2f}]".format(found.correlation, *found.interval)
         auc = "not defined" if found.auc is None else f"{found.auc:.2f}"
         rows.append((_spelled(name), str(found.axes), told, auc))
-    return _table(rows)
+    return table(rows[0], rows[1:])
 
 
 def _tried() -> str:
     """The table of the axes on which a learner was tried."""
     rows = [("task", "axis", "learner", "loss", "finding")]
     rows += [(one.task, one.axis, one.learner.name, f"{one.drop:+.2f}", one.learner.finding) for one in _trials()]
-    return _table(rows)
+    return table(rows[0], rows[1:])
 
 
 def _exceptions() -> str:
@@ -132,12 +133,7 @@ def _exceptions() -> str:
             counts = " → ".join(f"{100 * rate.value:.0f} %" for rate in rates if rate)
             what = EXCEPTIONS.get((one.task, one.axis), "not looked into")
             rows.append((one.task, one.axis, told, counts, what))
-    return _table(rows)
-
-
-def _table(rows: Sequence[Sequence[str]]) -> str:
-    titles, *others = rows
-    return "".join(f"| {' | '.join(row)} |\n" for row in (titles, ["---"] * len(titles), *others))
+    return table(rows[0], rows[1:])
 
 
 def sentence() -> str:
@@ -208,8 +204,8 @@ def _trials() -> list[Trial]:
     """All axes on which a learner was tried that works in training."""
     found = []
     for task in (load_task(name) for name in list_tasks() if ledger.current("baseline", name)):
-        cards = axis_records.cards(task)
-        for axis, baselines in axis_records.baselines(task).items():
+        cards = figures.cards(task.name)
+        for axis, baselines in figures.baselines(task).items():
             learner = next((baselines[name] for name in LEARNERS if name in baselines), None)
             if learner is None or learner.training is None or learner.training.value < MIN_TRAINING:
                 continue

@@ -1,11 +1,16 @@
-"""The tests and certificates under several versions of Python, MuJoCo and numpy, and docs/stacks.md's table.
+"""The tests and certificates under several versions of Python, MuJoCo and numpy, and the packages in integrations/.
 
     python tools/stacks.py sample                    # one small sample on MuJoCo 4, for CI
-    python tools/stacks.py all [STACK ...]           # quick tests, and one scenario of each task
+    python tools/stacks.py all [STACK ...]           # quick tests, and one scenario of each task, for docs/stacks.md
+    python tools/stacks.py integrations [NAME ...]   # packages in integrations/ with the real harnesses
 
 Each stack has an environment below build/stacks, into which pip resolves scengen without overrides. robosuite, from
 which the robot's files are read, is installed without its requirements. A stack whose Python is missing is reported as
 not tried. Results are stored in records/stacks.
+
+A package of integrations/ gets an environment below build/integrations, and its `check.py` plays the policy `replay` on
+a pool in distribution and on one out of it. The verdicts of all scenarios must be those of `scengen evaluate`; that of
+robomimic compares the actions of a checkpoint.
 """
 
 import json
@@ -13,7 +18,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +30,8 @@ FOLDER = ROOT / "build" / "stacks"
 RECORDS = ROOT / "records" / "stacks"
 SAMPLE_TASKS = ("domino_single", "cup_extract")
 """Tasks of the sample: the smallest one, and the one whose scene depends on a flag that MuJoCo 4 has inverted."""
+SPLITS = {"id": 10, "diagonal": 10}
+"""Number of scenarios of domino_single by split, on which packages are checked."""
 SAMPLE_TESTS = ("tests/control", "tests/sim", "tests/robots", "tests/skills")
 
 
@@ -48,16 +56,18 @@ STACKS = (
 
 
 def main(what: str = "", *names: str) -> None:
-    """Try stacks, and end with status 1 if one fails."""
-    known = {stack.name: stack for stack in STACKS}
-    if what not in ("sample", "all") or set(names) - set(known):
-        sys.exit(f"say stacks.py sample, or stacks.py all [{' | '.join(known)}]")
+    """Try stacks or packages, and end with status 1 if one fails."""
+    known = packages() if what == "integrations" else {stack.name: stack for stack in STACKS}
+    if what not in ("sample", "all", "integrations") or set(names) - set(known):
+        sys.exit(
+            f"say stacks.py sample, stacks.py all [STACK ...] or stacks.py integrations [NAME ...]; known: {[*known]}"
+        )
     failed = []
     for stack in STACKS[:1] if what == "sample" else [known[name] for name in names or known]:
         interpreter = found_python(stack.python)
         if not interpreter:
             print(f"{stack.name}: not tried: no python{stack.python} on this machine", flush=True)
-        elif not (sampled if what == "sample" else tried)(made(stack, interpreter), stack):
+        elif not TRIALS[what](interpreter, stack):
             failed.append(stack.name)
     sys.exit(f"failed: {', '.join(failed)}" if failed else 0)
 
@@ -72,21 +82,33 @@ def found_python(version: str) -> str:
     return next(works, "")  # pyenv has a command for each version, which fails unless the version is selected
 
 
-def made(stack: Stack, interpreter: str) -> Path:
-    """The interpreter of a stack's environment, which is made if it is missing."""
-    folder = FOLDER / stack.name
-    python = folder / "bin" / "python"
-    wanted = "\n".join([interpreter, *stack.requirements, (ROOT / "pyproject.toml").read_text()])
-    ready = folder / "ready"
+def environment_of(folder: Path, interpreter: str, requirements: Sequence[str], alone: Sequence[str] = ()) -> Path:
+    """The interpreter of an environment, which is made if it is missing or made from other requirements.
+
+    Args:
+        folder: folder of the environment.
+        interpreter: Python from which it is made.
+        requirements: arguments of pip.
+        alone: requirements that are installed without theirs.
+    """
+    python, ready = folder / "bin" / "python", folder / "ready"
+    own = (ROOT / "pyproject.toml").read_text() if any(str(ROOT) in one for one in requirements) else ""
+    wanted = "\n".join([interpreter, *requirements, *alone, own])
     if not ready.is_file() or ready.read_text() != wanted:
         shutil.rmtree(folder, ignore_errors=True)
         subprocess.run([interpreter, "-m", "venv", folder], check=True)
-        told = ["--quiet", "--disable-pip-version-check"]
-        install = [python, "-m", "pip", "install", *told]
-        subprocess.run([*install, "-e", f"{ROOT}[dev]", *stack.requirements], check=True)
-        subprocess.run([*install, "--no-deps", f"robosuite=={ROBOSUITE}"], check=True)  # the robot's files
+        install = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+        subprocess.run([*install, *requirements], check=True)
+        if alone:
+            subprocess.run([*install, "--no-deps", *alone], check=True)
         ready.write_text(wanted)
     return python
+
+
+def of_stack(interpreter: str, stack: Stack) -> Path:
+    """The interpreter of a stack's environment, with the files of the robot."""
+    requirements = ("-e", f"{ROOT}[dev]", *stack.requirements)
+    return environment_of(FOLDER / stack.name, interpreter, requirements, (f"robosuite=={ROBOSUITE}",))
 
 
 def runner(python: Path, stack: Stack) -> Callable[..., bool]:
@@ -112,20 +134,24 @@ def fresh(stack: Stack, name: str) -> str:
     return str(folder)
 
 
-def sampled(python: Path, stack: Stack) -> bool:
+def sampled(interpreter: str, stack: Stack) -> bool:
     """Tests of control, simulation and moves; pools of two tasks, verified here and compared under MuJoCo 3.5."""
+    python = of_stack(interpreter, stack)
     run, good = runner(python, stack), True
     for task in SAMPLE_TASKS:
         pool = fresh(stack, task)
         good &= run("scengen", "generate", f"task={task}", "n=1", f"pool={pool}") and run(
             "scengen", "verify", f"pool={pool}"
         )
-    good &= run("scengen", "drift", f"pool={FOLDER / f'{stack.name}-{SAMPLE_TASKS[0]}'}", "mujoco=[3.5.0,4.0.0]")
+    good &= run(
+        "scengen", "verify", "mujoco", f"pool={FOLDER / f'{stack.name}-{SAMPLE_TASKS[0]}'}", "mujoco=[3.5.0,4.0.0]"
+    )
     return good & run("pytest", "-q", "-p", "no:cacheprovider", *SAMPLE_TESTS)
 
 
-def tried(python: Path, stack: Stack) -> bool:
+def tried(interpreter: str, stack: Stack) -> bool:
     """The quick tests, and one scenario of each task, certified and verified. The result is stored."""
+    python = of_stack(interpreter, stack)
     run = runner(python, stack)
     made = run("scengen", "generate", "task=domino_single", "n=6", "workers=2", f"pool={fresh(stack, 'pool')}")
     tests = made and run("pytest", "-q", "-p", "no:cacheprovider", "-n", "2", "--dist", "loadfile")
@@ -160,6 +186,45 @@ def certified(run: Callable[..., bool], stack: Stack) -> Iterator[tuple[str, boo
             run("scengen", "generate", f"task={task}", "n=1", f"pool={pool}")
             and run("scengen", "verify", f"pool={pool}"),
         )
+
+
+def packages() -> dict[str, Stack]:
+    """The packages in integrations/, with the version of Python that each needs."""
+    found = {}
+    for path in sorted((ROOT / "integrations").glob("*/pyproject.toml")):
+        needs = tomllib.loads(path.read_text())["project"]["requires-python"].removeprefix(">=")
+        python = "" if sys.version_info >= tuple(map(int, needs.split("."))) else needs
+        found[path.parent.name] = Stack(path.parent.name, python, (str(ROOT), str(path.parent)))
+    return found
+
+
+def integrated(interpreter: str, package: Stack) -> bool:
+    """Whether the check of a package passes, on pools that are certified in its environment."""
+    home = ROOT / "build" / "integrations" / package.name
+    python = environment_of(home, interpreter, package.requirements, (f"robosuite=={ROBOSUITE}",))
+    install = [
+        python,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+        "--no-deps",
+        "--force-reinstall",
+    ]
+    subprocess.run([*install, *package.requirements], check=True)  # the code of today
+    folders = [home / "pools" / split for split in SPLITS]
+    for folder, (split, n) in zip(folders, SPLITS.items(), strict=True):
+        if not (folder / "manifest.json").exists():
+            asked = ("task=domino_single", f"split={split}", f"n={n}", f"pool={folder}")
+            subprocess.run([home / "bin" / "scengen", "generate", *asked], check=True)
+    print(f"{package.name}:", flush=True)
+    check = ROOT / "integrations" / package.name / "check.py"
+    return subprocess.run([python, check, *folders], cwd=home.parent).returncode == 0
+
+
+TRIALS: Mapping[str, Callable[[str, Stack], bool]] = {"sample": sampled, "all": tried, "integrations": integrated}
+"""Functions that try a stack or a package with an interpreter, and return whether it passes."""
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "Generate and check": ("tasks", "try", "generate", "verify", "attack"),
     "Demonstrate and train": ("demos", "record", "curate", "train"),
     "Look and export": ("show", "studio", "site", "report", "export"),
-    "Evaluate and analyse": ("evaluate", "edition", "agent", "axis", "subset", "bench"),
+    "Evaluate and analyse": ("evaluate", "edition", "agent", "axis", "measure", "subset", "bench"),
     "Extend": ("new", "asset"),
 }
 """Commands by purpose."""
@@ -60,6 +60,7 @@ CONTINUING = (
     "attack",
     "axis card",
     "axis discover",
+    "measure",
     "site",
 )
 """Commands that keep finished work when they are interrupted, and continue from there."""

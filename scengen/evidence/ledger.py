@@ -7,8 +7,9 @@ of another version is only named, never shown as if it were of this one.
 import fcntl
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -28,6 +29,7 @@ Kind = Literal[
     "recall",
     "mutation",
     "plan",
+    "prior",
     "drift",
 ]
 """Kind of a measurement, and name of its folder in records/.
@@ -35,7 +37,8 @@ Kind = Literal[
 `certified`: scenarios certified of the first draws, and what the oracle and robosuite did; `axis`: card of an axis;
 `belief`: planners with beliefs of training; `baseline`, `training`: trained policies; `attack`: the adversary; `cheat`:
 cheats of people; `leak`: hidden parameters in observations; `recall`: cheats that the adversary finds again;
-`mutation`: rules left out; `plan`: plans carried out; `drift`: verdicts under other versions of MuJoCo.
+`mutation`: rules left out; `plan`: plans carried out; `prior`: answers that need no look; `drift`: verdicts under other
+versions of MuJoCo.
 """
 KINDS: tuple[Kind, ...] = get_args(Kind)
 """All kinds."""
@@ -72,9 +75,40 @@ class Evidence:
         return made_with.items() <= self.made_with.items()
 
 
-def folder() -> Path:
-    """Folder of the ledger."""
-    return task_files.shipped("records")
+_OPENED: ContextVar[tuple[str | None, tuple[str, ...]]] = ContextVar("opened", default=(None, ()))
+"""Folder that replaces the ledgers of all tasks, and the overrides that add folders of other packages."""
+
+
+@contextmanager
+def opened(folder: str | None, search: Sequence[str] = ()) -> Iterator[None]:
+    """Read and write a certain ledger.
+
+    Args:
+        folder: its folder; None for the ledger of each task, see `folder_of`.
+        search: overrides that add folders of other packages, see `task_files.search_path`.
+    """
+    token = _OPENED.set((folder, tuple(search)))
+    try:
+        yield
+    finally:
+        _OPENED.reset(token)
+
+
+def folder_of(task: str) -> Path:
+    """Folder of the ledger about a task: `records` beside the folder of its task file, as in another package.
+
+    For scengen's own tasks, and for those that exist no more, it is the ledger that comes with scengen.
+    """
+    folder, search = _OPENED.get()
+    if folder is not None:
+        return Path(folder)
+    conf = task_files.conf_of(task, search)
+    return conf / "records" if conf and conf != task_files.conf_dir() else task_files.shipped("records")
+
+
+def version_of(task: str) -> int:
+    """Today's version of a task."""
+    return task_files.version(task, _OPENED.get()[1])
 
 
 def read(kind: Kind, task: str) -> list[Evidence]:
@@ -83,14 +117,14 @@ def read(kind: Kind, task: str) -> list[Evidence]:
     Raises:
         BadConfig: a line of the file is not a row.
     """
-    path = folder() / kind / f"{task}.jsonl"
+    path = folder_of(task) / kind / f"{task}.jsonl"
     return list(_rows(path)) if path.is_file() else []
 
 
 def current(kind: Kind, task: str) -> list[Evidence]:
     """The rows of a kind about today's version of an installed task."""
     rows = read(kind, task)
-    return [row for row in rows if row.version == task_files.version(task)] if rows else []
+    return [row for row in rows if row.version == version_of(task)] if rows else []
 
 
 def latest(kind: Kind, task: str, **made_with: Any) -> dict[str, Evidence]:
@@ -101,7 +135,7 @@ def latest(kind: Kind, task: str, **made_with: Any) -> dict[str, Evidence]:
 
 def write(row: Evidence) -> None:
     """Add a row to the ledger. It replaces the row of the same place, whatever version that is about."""
-    path = folder() / row.kind / f"{row.task}.jsonl"
+    path = folder_of(row.task) / row.kind / f"{row.task}.jsonl"
     path.parent.mkdir(parents=True, exist_ok=True)
     with _locked(path.parent):
         known = _rows(path) if path.is_file() else ()
@@ -114,7 +148,7 @@ def write(row: Evidence) -> None:
 
 def not_measured(task: str) -> str:
     """What a page says where there is no row about today's version of a task."""
-    return f"not measured on version {task_files.version(task)}"
+    return f"not measured on version {version_of(task)}"
 
 
 def _rows(path: Path) -> Iterator[Evidence]:

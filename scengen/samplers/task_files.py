@@ -115,6 +115,12 @@ def facts_file(name: str, search: Sequence[str] = ()) -> Path | None:
     return found if found and found.is_file() else None
 
 
+def conf_of(name: str, search: Sequence[str] = ()) -> Path | None:
+    """The folder of configuration files that a task is from; None if there is no such task."""
+    path = _files(tuple(search)).get(name)
+    return path.parents[1] if path else None
+
+
 def behaviour_file(name: str, search: Sequence[str] = ()) -> Path:
     """The file with the stored behaviour of a task, `behaviour/<task>.json` beside the folder of its task file.
 

@@ -1,7 +1,7 @@
 """Writing of the site: pages of tasks, and the list of tasks."""
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -11,15 +11,13 @@ import jinja2
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
-from ..agents import facts
 from ..errors import BadConfig, ScengenError
-from ..evidence.ledger import latest
+from ..measures import figures
 from ..pool import Pool, PoolRow
 from ..samplers.axis import spell
-from ..samplers.dists import Fixed
 from ..samplers.task import Task
 from ..work.targets import write
-from . import exhibit, films
+from . import exhibit, films, task_page
 from .exhibit import Exhibit, key_of
 
 CATEGORIES = {
@@ -142,11 +140,16 @@ class _Pages:
             task=task,
             made=made,
             category=CATEGORIES.get(task.category, task.category),
-            story=story(inspect.getdoc(inspect.getmodule(task.family)) or ""),
+            story=rendered([inspect.getdoc(inspect.getmodule(task.family)) or ""]),
             pairs={pair.axis: pair for pair in made.pairs},
-            certified=latest("certified", task.name),
-            parameters=[*_parameters(task)],
-            subgoals=_subgoals(task, self.search),
+            measured=figures.axes(task),
+            sections={
+                "Certification": rendered(task_page.certification(task)),
+                "Attacks": rendered(task_page.attacks(task)),
+                "Trained policies": rendered(task_page.policies(task)),
+            },
+            parameters=rendered(task_page.parameters(task)),
+            understanding=rendered(task_page.understanding(task, self.search)),
             spell=spell,
             before=names[place - 1] if place else None,
             after=names[place + 1] if place + 1 < len(names) else None,
@@ -158,47 +161,12 @@ class _Pages:
         write(self.to / path, self._templates.get_template(template).render({"up": up, **values}))
 
 
-def story(text: str) -> Markup:
-    """A docstring as HTML. Its indented sketches keep their form."""
-    return Markup(MarkdownIt("commonmark", {"html": False}).render(text))
+def rendered(lines: Iterable[str]) -> Markup:
+    """A docstring or a section as HTML. Indented sketches keep their form."""
+    return Markup(MarkdownIt("commonmark", {"html": False}).enable("table").render("\n".join(lines)))
 
 
 def _order(made: Exhibit) -> tuple[int, str]:
     """The paper's categories first, each with its tasks in the order of their codes."""
     known = [*CATEGORIES]
     return known.index(made.category) if made.category in known else len(known), made.code
-
-
-def _parameters(task: Task) -> list[dict[str, str]]:
-    """Lines of the table of parameters."""
-    lines = []
-    for p in task.known.values():
-        dist = task.training[p.name]
-        spread = "" if dist == Fixed(p.nominal) else spell(dist)
-        hidden = " (hidden)" if p.hidden else ""
-        unit = "" if p.unit == "1" else p.unit
-        lines.append(
-            {
-                "parameter": f"{p.name}{hidden}",
-                "unit": unit,
-                "training": spread or f"{p.nominal:g}",
-                "bounds": f"{p.low:g} to {p.high:g}",
-            }
-        )
-    return lines
-
-
-def _subgoals(task: Task, search: Sequence[str]) -> list[dict[str, str]]:
-    """Lines of the table of sub-goals; none for a task without a sheet of facts."""
-    try:
-        sheet = facts.load(task, search)
-    except BadConfig:
-        return []
-    lines = []
-    for name, subgoal in sheet.order.items():
-        before = [one for one, giver in sheet.order.items() if set(giver.gives) & set(subgoal.needs)]
-        notes = [note for note in ("senses", "optional", "repeats") if getattr(subgoal, note)]
-        lines.append(
-            {"sub-goal": name, "outcome": subgoal.outcome, "after": ", ".join(before), "notes": ", ".join(notes)}
-        )
-    return lines

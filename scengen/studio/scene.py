@@ -34,7 +34,7 @@ GRID = 2.0**-12
 """Distance of the places that vertices of meshes can have [m]: 0.24 mm, which nobody sees."""
 ROBOT_SHARE = 0.05
 """Share of the triangles of large parts of the robot that is shown. 95 % of the surface moves by less than 2 mm, and a
-browser that draws in software gets through four times as many pictures (`tools/studio_speed.py`)."""
+browser that draws in software gets through four times as many pictures."""
 SMALL_PART = 400
 """Number of triangles up to which a part of the robot is shown as it is, and least number of those of a larger one."""
 PEDESTAL = "pedestal"

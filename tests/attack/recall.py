@@ -1,5 +1,8 @@
 """Which cheats of people does the adversary find by itself? `python tests/attack/recall.py [n] [budget] [task ...]`
 
+`python tests/attack/recall.py play [task ...]` plays each cheat on the same draws of training in its task as it is and
+without its mend, into `records/cheat`. docs/kept_cheats.md shows both.
+
 Every kept cheat (`hands`) has a mend. Here the mend is taken out, and the adversary attacks the open task. If the mend
 is a rule, a success counts if the closed task refuses the same actions. If it changes the physics or the events, the
 same actions prove nothing; there the closed task is attacked as well, and must be solved less than half as often.
@@ -14,7 +17,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 from opened import Opened
-from test_hands import HANDS
+from test_hands import HANDS, outcome
 
 from scengen.attack.adversary import CLOCK, MEMORY, PRIOR, RANDOM, SEARCH, SERVO, SHORTCUT, TIERS
 from scengen.attack.campaign import GRAMMAR, AttackJob, AttackSettings, drawn, fitted
@@ -29,6 +32,22 @@ UNAIDED = (SHORTCUT, PRIOR, MEMORY, CLOCK, SERVO, RANDOM, SEARCH)
 """Tiers that do not continue the witness of the scenario, which of course reaches the goal. They alone attack a task
 whose mend changes the physics or the events."""
 SEED = 21
+DRAWS = 12
+"""Number of training draws on which cheats are played."""
+
+
+def play(*tasks):
+    """Play the cheats that the ledger lacks."""
+    for name, cheat in HANDS:
+        task, made_with = load_task(name), {"cheat": cheat, "draws": DRAWS}
+        if (tasks and name not in tasks) or measuring.measured(task, "id", "cheat", made_with):
+            continue
+        found = {
+            which: [outcome(name, cheat, index, mended) for index in range(DRAWS)].count("success")
+            for which, mended in (("closed", True), ("open", False))
+        }
+        measuring.keep(task, "id", "cheat", DRAWS, found, made_with)
+        print(f"{name} {cheat}: {found['closed']} of {DRAWS}, {found['open']} without its mend", flush=True)
 
 
 def job(task, n, budget, tiers):
@@ -99,4 +118,4 @@ def main(n=4, budget=320, *tasks):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    play(*sys.argv[2:]) if sys.argv[1:2] == ["play"] else main(*sys.argv[1:])

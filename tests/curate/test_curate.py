@@ -12,7 +12,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-import trainings
 
 from scengen import cli
 from scengen.agents.models import Reply
@@ -25,6 +24,7 @@ from scengen.demos.curate.videos import PROBES, Prober, check_video, compared, s
 from scengen.demos.generate import DemosSettings, generate_demonstrations
 from scengen.errors import BadConfig, PoolError
 from scengen.export.dataset import Recording
+from scengen.measures import policies
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +49,8 @@ def curated(folder, replay=True):
 
 
 def test_the_episodes_that_the_measurement_of_curation_spoils_are_all_left_out(mine, monkeypatch):
-    monkeypatch.setattr(trainings, "EVERY", 1)
-    trainings.spoil(mine)
+    monkeypatch.setattr(policies, "EVERY", 1)
+    policies.spoil(mine)
     found = [{finding.check for finding in report.findings} for report in curated(mine).reports]
     assert [bool(checks) for checks in found] == [True, True, True, False], "late, frozen, of the next episode, sound"
     assert "REPLAY" in found[0] & found[2]

@@ -4,21 +4,19 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 
-import all_axes
-import attack_all
-import axis_records
 import baselines_page
-import cluster_page
-import drift_all
-import kept_cheats
 import predictors
 import pytest
+import tables
 
 from scengen import list_tasks, load_task
 from scengen.cli import run
 from scengen.errors import BadConfig
 from scengen.evidence import ledger, measuring
 from scengen.evidence.ledger import KINDS, Evidence
+from scengen.measures.measurement import Result, Row
+from scengen.measures.policies import MIXED
+from scengen.measures.scenarios import Certified
 from scengen.samplers import task_files
 
 TASK = load_task("domino_single")
@@ -29,7 +27,7 @@ ROW = Evidence(TASK.name, 1, "id", "plan", 3, {"solved": 2}, {"seed": 0}, measur
 @pytest.fixture
 def empty(tmp_path, monkeypatch):
     """A ledger without rows."""
-    monkeypatch.setattr(ledger, "folder", lambda: tmp_path)
+    monkeypatch.setattr(ledger, "folder_of", lambda task: tmp_path)
     return tmp_path
 
 
@@ -38,7 +36,7 @@ def empty(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_file_is_about_a_task_and_every_row_is_whole(kind):
-    for path in (ledger.folder() / kind).iterdir():
+    for path in (task_files.shipped("records") / kind).iterdir():
         assert path.suffix == ".jsonl" and path.stem in list_tasks()
         rows = ledger.read(kind, path.stem)
         assert path.read_text() == "".join(json.dumps(asdict(row), sort_keys=True) + "\n" for row in rows)
@@ -142,18 +140,22 @@ def test_of_several_rows_of_a_split_the_largest_is_shown(empty):
 
 
 def test_certification_is_measured_once(empty, monkeypatch):
-    certified = pytest.importorskip(
-        "certified", reason="no robosuite, in which the tool plays witnesses", exc_type=ImportError
-    )
     calls = []
-    monkeypatch.setattr(certified, "measured", lambda task, split, **asked: calls.append(split) or {"indices": 3})
+
+    def result(self, job):
+        calls.extend(job.splits)
+        return Result(job, [Row(job.splits[0], 3, {"indices": 3})])
+
+    monkeypatch.setattr(Certified, "result", result)
     splits = ["id", *TASK.axes]
-    certified.main("2", f"split={splits[0]}", TASK.name)
+    words = ("measure", "kind=certified", f"task={TASK.name}")
+    assert run((*words, "n=2", "splits=id")) == 0
     for _ in range(2):
-        certified.main("2", TASK.name)
+        assert run((*words, "n=2")) == 0
     assert calls == splits
-    certified.main("3", "split=id", TASK.name)
-    assert calls == [*splits, "id"]
+    assert run((*words, "n=3", "splits=id")) == 0
+    assert run((*words, "n=3", "splits=id", "fresh=true")) == 0
+    assert calls == [*splits, "id", "id"]
 
 
 # --- what is shown --------------------------------------------------------------------------
@@ -165,7 +167,7 @@ def of_another_version(empty):
     for row in ROWS:
         if row.task == TASK.name:
             ledger.write(replace(row, version=7))
-    pages = (baselines_page._rates, baselines_page._measured, baselines_page._trainings)
+    pages = (baselines_page._rates, baselines_page._measured, baselines_page._trainings, tables.of_axes)
     cached = (*pages, predictors.ranking, predictors._trials)
     for of in cached:
         of.cache_clear()
@@ -176,15 +178,14 @@ def of_another_version(empty):
 
 def test_no_page_shows_figures_of_another_version(of_another_version):
     none = "not measured on version 1"
-    cells = all_axes._row(TASK, "diagonal", None, axis_records.baselines(TASK)["diagonal"], None)
-    assert set(cells[2:]) <= {none, "nothing hidden"}
+    assert set(tables.of_axes(TASK.name)["diagonal"].values()) <= {none, "nothing hidden"}
     assert all(not ledger.current(kind, TASK.name) for kind in KINDS)
-    assert attack_all.reports() == {} and f"`{TASK.name}`: {none}" in attack_all.fills()["attacks"]
+    assert tables.reports() == {} and f"`{TASK.name}`: {none}" in tables.attacks()["attacks"]
     assert f"| [{TASK.name}](tasks/{TASK.name}.md) | {none} |" in baselines_page._all_splits()
-    assert not baselines_page._trainings(baselines_page.MIXED)
-    assert [line for line in kept_cheats.rows() if TASK.name in line and line.count(none) != 3] == []
-    assert TASK.name not in drift_all.fills()["drift"]
-    assert f"| [{TASK.name}](tasks/{TASK.name}.md) | {none} |" in cluster_page.table()
+    assert not baselines_page._trainings(MIXED)
+    assert [row for row in tables.cheats() if TASK.name in row[0] and row.count(none) != 3] == []
+    assert TASK.name not in tables.drift()["drift"]
+    assert f"| [{TASK.name}](tasks/{TASK.name}.md) | {none} |" in tables.cluster()["costs"]
 
 
 def test_the_terminal_tells_what_was_not_measured(of_another_version, capsys, monkeypatch):

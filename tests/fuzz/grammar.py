@@ -233,6 +233,7 @@ class Grammar:
             "show view": ("id", "0"),
             "try": ("index", "1") if found else ("id", "0"),
             "evaluate": ("policy", "idle"),
+            "measure": ("kind", "belief"),
             "asset": ("name", "cup"),
             "new": ("package", "lab_tasks"),
         }

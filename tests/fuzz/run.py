@@ -131,6 +131,7 @@ WORK = (
     "scengen.cli.commands.try._played",
     "scengen.cli.commands.axis_card.make_axis_card",
     "scengen.cli.commands.edition.differences",
+    "scengen.cli.commands.measure.measure",
     "scengen.cli.commands.axis_discover.discover",
     "scengen.export.recording._writer",
     "scengen.export.hub.publish",

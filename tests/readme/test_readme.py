@@ -12,7 +12,9 @@ from scengen.cli.verbs import parsed
 
 LINES = [
     line
-    for line in commands(*PAGES, ROOT / "docs" / "axis.md", ROOT / "task_template" / "README.md")
+    for line in commands(
+        *PAGES, *(ROOT / path for path in ("docs/axis.md", "docs/measure.md", "task_template/README.md"))
+    )
     if line.startswith("scengen ") and "/path/to/" not in line  # tests/cli/test_own_axis.py has these with a folder
 ]
 

@@ -109,7 +109,7 @@ def test_buttons_that_are_held_between_two_takes_do_not_act_again(gamepad):
 def test_the_loop_drives_in_real_time_and_events_act_soon():
     timing, _, delays = measure(1.5)
     assert len(delays) > 8
-    assert np.median(delays) < 0.03  # the machine of the tests is busy; tools/virtual_pad.py measures
+    assert np.median(delays) < 0.03  # the machine of the tests is busy; virtual_pad.py measures
     assert len(timing.late) > 100 and "control periods" in timing.told()
 
 

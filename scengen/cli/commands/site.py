@@ -7,6 +7,7 @@ from types import ModuleType
 
 from ... import compose
 from ...errors import BadConfig
+from ...evidence import ledger
 from ...ood.analysis.redraw import task_of
 from ...pool import Pool
 from ...runs.progress import ProgressBar
@@ -23,6 +24,7 @@ class SiteSettings:
 
     pool: str | list[str] | None
     to: str
+    records: str | None
 
 
 def command(arguments: Arguments) -> int:
@@ -33,22 +35,17 @@ def command(arguments: Arguments) -> int:
         raise BadConfig("give either task=NAME, to certify a scenario of it, or pool=FOLDER, to show those of pools")
     try_folder(settings.to)
     search = search_path(arguments)
-    shown = _of_pools(module, settings.pool, search) if settings.pool else _of_tasks(module, arguments, by_task)
-    with ProgressBar(err, "site", len(shown)) as bar:
+    if settings.pool:
+        shown = _of_pools(module, settings.pool, search)
+    else:
+        shown = [module.Shown(compose.load_task(name, search)) for name in compose.chosen_tasks("site", arguments)]
+    with ledger.opened(settings.records, search), ProgressBar(err, "site", len(shown)) as bar:
         built = module.build(shown, Path(settings.to), search, lambda done, _, what: bar.show(done, what))
     for name, why in built.failed.items():
         warn(f"scengen: {name} has no page: {why}")
     made = f"{len(built.made)} tasks made, {len(built.kept)} up to date, {len(built.failed)} failed"
     say(f"wrote {Path(settings.to) / 'index.html'}: {made}")
     return FAILED if built.failed else OK
-
-
-def _of_tasks(module: ModuleType, arguments: Arguments, chosen: bool) -> list[object]:
-    """The chosen tasks, or all."""
-    others = [argument for argument in arguments if not argument.startswith(("pool=", "to=", "task="))]
-    asked = compose.combinations("site", arguments if chosen else [*arguments, "task=all"])
-    names = [compose.chosen_task("site", one.overrides) for one in asked]
-    return [module.Shown(compose.load_task(name, others)) for name in filter(None, names)]
 
 
 def _of_pools(module: ModuleType, folders: str | list[str], search: Sequence[str]) -> list[object]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from ... import compose
 from ...errors import UnknownName
-from ...evidence.ledger import latest
+from ...evidence import ledger
 from ...evidence.table import evidence_table
 from ...samplers import task_files
 from ...samplers.task_files import about, search_path
@@ -21,6 +21,7 @@ class TasksSettings:
     """Settings of `scengen tasks`; conf/command/tasks.yaml explains them."""
 
     axes: str | None
+    records: str | None
 
 
 def command(arguments: Arguments) -> int:
@@ -28,17 +29,24 @@ def command(arguments: Arguments) -> int:
     if settings.axes not in (None, PAPER):
         raise UnknownName("choice of axes", settings.axes, [PAPER])
     search = search_path(arguments)
+    with ledger.opened(settings.records, search):
+        _print(settings.axes, name, arguments)
+    return OK
+
+
+def _print(axes: str | None, name: str | None, arguments: Arguments) -> None:
+    """Print the tables of a task, or the list of tasks or of the paper's axes."""
+    search = search_path(arguments)
     listed = [about(each, search) for each in ([name] if name else task_files.tasks(search))]
     listed.sort(key=lambda task: (task.category[:1] != "P", task.category, task.code))  # the paper's, then ours
-    if name is None and not settings.axes:
-        out.print(tasks_table(listed, {each.name: latest("certified", each.name) for each in listed}))
-        return OK
+    if name is None and not axes:
+        out.print(tasks_table(listed, {each.name: ledger.latest("certified", each.name) for each in listed}))
+        return
     # Loading a task takes 0.1 s of processor time: only these branches print its numbers, which loading checks.
-    others = [a for a in arguments if not a.startswith(("task=", "axes="))]
+    others = [a for a in arguments if not a.startswith(("task=", "axes=", "records="))]
     tasks = [compose.load_task(each.name, others) for each in listed if name or each.paper_axes]
-    if settings.axes:
+    if axes:
         out.print(axes_table([(task, axis) for task in tasks for axis in task.axes.values() if task.of_paper(axis)]))
     else:
         for table in (*task_tables(tasks[0]), evidence_table(tasks[0])):
             out.print(table)
-    return OK

@@ -1,0 +1,1 @@
+"""Measurements that fill the evidence ledger, and the tables that show what the ledger holds about a task."""
