@@ -30,9 +30,9 @@ def memory_is_given_back():
 
 DURATIONS = Path(__file__).parent / "durations.txt"
 """Processor times [s] and ids of the tests that take at least `SLOW`, a line each. Written by `make durations`."""
-SLOW, LONG = 1.5, 4.0
-"""Processor time from which a test is run by `make slow`, and from which it is run by `make long` alone [s]. The mark
-`slow(each_change=True)` keeps a longer test among the slow ones."""
+SLOW = 1.0
+"""Processor time from which a test is run by `make slow` alone [s]. The mark `each_change` keeps a longer test among
+those of continuous integration."""
 STARTED = pytest.StashKey[float]()
 
 
@@ -50,13 +50,10 @@ def known_durations():
 def pytest_collection_modifyitems(items):
     known = known_durations()
     for item in items:
-        seconds = known.get(item.nodeid, 0.0)
         if "chromium" in item.fixturenames:  # two browsers at once draw too slowly in software
-            item.add_marker("slow")
+            item.add_marker("each_change")
             item.add_marker(pytest.mark.xdist_group("browser"))
-        elif seconds >= LONG and not any(mark.kwargs.get("each_change") for mark in item.iter_markers("slow")):
-            item.add_marker("long")
-        elif seconds >= SLOW:
+        elif known.get(item.nodeid, 0.0) >= SLOW and not item.get_closest_marker("each_change"):
             item.add_marker("slow")
 
 

@@ -221,7 +221,7 @@ def finished(pool):
             return 0
 
 
-@pytest.mark.long  # it waits for minutes
+@pytest.mark.slow  # it waits for minutes
 @on_nodes
 def test_pools_have_the_same_bytes_on_one_process_on_two_nodes_and_when_a_node_dies(nodes, tmp_path):
     assert cli.run([*POOL, f"pool={tmp_path / 'local'}"]) == 0
@@ -261,7 +261,7 @@ def test_limits_hold_on_nodes(ours):
         list(each(work, ["crash"], ours, LIMITS))
 
 
-@pytest.mark.long  # it waits for minutes
+@pytest.mark.slow  # it waits for minutes
 @on_nodes
 def test_what_kills_its_worker_twice_is_lost_and_a_run_of_nothing_else_ends(ours, monkeypatch):
     monkeypatch.setattr(crew, "NODE_DEATH_DELAY", 2.0)

@@ -59,7 +59,7 @@ def test_a_script_is_short_says_what_it_prints_and_uses_public_names(path):
     assert not [part for part in parts if part.startswith("_")]
 
 
-@pytest.mark.slow(each_change=True)
+@pytest.mark.each_change
 @pytest.mark.parametrize("path", [script(path) for path in SCRIPTS])
 def test_a_script_runs_as_it_is(path, tmp_path):
     if path.stem in EXTRAS:
@@ -73,7 +73,7 @@ def test_a_script_runs_as_it_is(path, tmp_path):
     assert {found.name for found in tmp_path.iterdir()} <= {"generated"}
 
 
-@pytest.mark.slow(each_change=True)
+@pytest.mark.each_change
 def test_the_notebook_runs_and_shows_tables_and_films():
     nbclient = pytest.importorskip("nbclient", reason="no nbclient; it is in the extra dev")
     pytest.importorskip("ipykernel", reason="no ipykernel; it is in the extra dev")

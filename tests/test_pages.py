@@ -38,7 +38,7 @@ def test_people_keep_what_they_can_read():
     assert sum(len(path.read_text().split()) for path in (ROOT / "docs").rglob("*.md")) <= MOST_WORDS
 
 
-@pytest.mark.slow(each_change=True)  # all tasks are loaded: 19 s
+@pytest.mark.each_change  # all tasks are loaded: 19 s
 def test_the_page_of_results_is_that_of_the_ledger():
     text = tables.RESULTS.read_text()
     assert text == tables.results(), "docs/results.md is out of date; run make results"

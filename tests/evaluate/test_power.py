@@ -56,7 +56,7 @@ def test_more_of_anything_finds_smaller_drops_and_more_questions_larger_ones():
     assert seeds_for(PowerAnalysis(), 0.7, 0.001) is None
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seeds", "rollouts", "twins", "before"),
     [(20, 5, 0.0, 0.7), (20, 5, 0.9, 0.7), (50, 5, 0.5, 0.7), (8, 5, 0.5, 0.9), (20, 1, 0.0, 0.9)],
@@ -97,7 +97,7 @@ def test_an_analysis_that_makes_no_sense_is_refused(wrong):
         replace(PowerAnalysis(), **wrong)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_command_answers_both_ways(tmp_path, capsys):
     told = tmp_path / "power.json"
     arguments = ("seeds=8", "rollouts=12", "correlation=0", "success=0.7", "drop=0.2", f"json={told}")

@@ -79,7 +79,7 @@ def test_the_clustered_interval_covers_the_truth_and_a_naive_one_does_not():
     assert covers((wilson(values.mean(), 100) for values in found), 0.5) < 0.9
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("scenarios", [8, 20, 50])
 @pytest.mark.parametrize("p", [0.05, 0.2, 0.5, 0.8, 0.95])
 def test_intervals_hold_the_truth_whatever_the_correlation(scenarios, p):
@@ -88,7 +88,7 @@ def test_intervals_hold_the_truth_whatever_the_correlation(scenarios, p):
         assert covers(map(mean_interval, shares(random, 1000, scenarios, p, icc)), p) >= 0.93
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("scenarios", [8, 20, 50])
 @pytest.mark.parametrize("twins", [0.0, 0.5, 0.9])
 def test_differences_of_twins_hold_the_truth_whatever_they_share(scenarios, twins):
@@ -104,7 +104,7 @@ def test_differences_of_twins_hold_the_truth_whatever_they_share(scenarios, twin
         assert covers(((d.low, d.high) for d in found), before - after) >= 0.93
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("shared", [0.0, 0.3, 0.8])
 def test_a_mean_over_axes_holds_the_truth_though_they_share_their_difficulty(shared):
     """Six axes of 20 scenarios: number i of each is the same scenario but for the axis."""

@@ -45,7 +45,7 @@ def cheats(task, monkeypatch):
 
 
 @of_stored_pools
-@pytest.mark.slow(each_change=True)
+@pytest.mark.each_change
 @pytest.mark.parametrize("task", list_tasks())
 def test_a_task_behaves_as_it_is_stored(task, monkeypatch):
     known = cheats(task, monkeypatch)

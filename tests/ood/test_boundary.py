@@ -105,7 +105,7 @@ def curves():
     }
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [SHORT, LONG])
 def test_intervals_cover_the_boundary_on_curves_of_every_kind(world_where, tmp_path, axis):
     known = curves()

@@ -3,7 +3,7 @@
 import build_docs
 import pytest
 
-pytestmark = pytest.mark.long  # Sphinx takes two minutes
+pytestmark = pytest.mark.slow  # Sphinx takes two minutes
 
 PAGES = ("index", "results", "axes", "baselines", "tasks/domino_single", "tasks/packing", "api/moves", "contributing")
 

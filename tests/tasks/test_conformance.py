@@ -1,4 +1,4 @@
-"""Every task keeps to the rules, on every split; `make long` also certifies the first training scenario of each.
+"""Every task keeps to the rules, on every split; `make slow` also certifies the first training scenario of each.
 
 `make certify` certifies scenarios of all splits; the rules themselves are tested in `test_foreign_task.py`.
 """
