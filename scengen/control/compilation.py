@@ -1,6 +1,7 @@
 """Notice about the first compilation of the control loop, which takes some seconds without any other output."""
 
 import sys
+from contextlib import suppress
 from functools import cache
 
 from numba.core import event
@@ -28,7 +29,8 @@ class _Announcement(event.Listener):
         what = (event.data or {})["dispatcher"].py_func.__module__
         if not self._told and what.startswith(f"{__package__}."):
             self._told = True
-            print(NOTICE, file=sys.stderr, flush=True)
+            with suppress(OSError, ValueError):  # the notice is not worth an error where standard error is closed
+                print(NOTICE, file=sys.stderr, flush=True)
 
     def on_end(self, event: event.Event) -> None:
         pass
