@@ -66,7 +66,7 @@ class Episode:
         """
         self.begin()
         try:
-            self.world.apply(action)
+            self.world.step_filtered(action)
         except Unstable as error:
             self.outcome, self.reason = "unstable", str(error)
             return self.outcome

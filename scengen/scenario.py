@@ -170,7 +170,7 @@ class Scenario(abc.ABC):
         parameters.
 
         A family has no state. What events need to know about the episode so far is in `world.memory`, which only this
-        method may write. Only this method may call `arm.jam`, `arm.tell`, `world.move`, `world.launch` and
+        method may write. Only this method may call `arm.jam`, `arm.set_action`, `world.move`, `world.launch` and
         `world.spin`.
         """
 

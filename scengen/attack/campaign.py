@@ -353,9 +353,9 @@ def _report(
     untried = tuple(UntriedShortcut(**one) for record in records for one in record["untried"])
     cpu = sum(record["cpu"] for record in records)
     lost = tuple(f"{record['scenario']} {record['lost']}" for record in records if record["lost"])
-    told = tuple(_sorted(rates(counts)))
+    sorted_rates = tuple(_sorted(rates(counts)))
     return AttackReport(
-        task.name, task.version, rules, tuple(order), told, tuple(hits), priors, untried, lost, folder, cpu
+        task.name, task.version, rules, tuple(order), sorted_rates, tuple(hits), priors, untried, lost, folder, cpu
     )
 
 

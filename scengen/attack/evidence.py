@@ -127,8 +127,8 @@ class Hit:
             return cls(**about, actions=actions)
         except (OSError, ValueError, TypeError, KeyError, EOFError, MemoryError, BadZipFile, zlib.error) as error:
             why = cut(" ".join(str(error).split()))
-            told = f"{path} is not a hit of scengen attack, or is damaged: {why}"
-            raise BadConfig(f"{told}; give one that scengen attack has stored") from None
+            message = f"{path} is not a hit of scengen attack, or is damaged: {why}"
+            raise BadConfig(f"{message}; give one that scengen attack has stored") from None
 
 
 def _plain_hit(about: Any) -> dict[str, Any]:

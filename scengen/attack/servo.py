@@ -37,20 +37,20 @@ STOP_PITCHES = (math.radians(30.0), 0.0)
 """Angles by which a hand that stops a swinging body looks higher than where the witness takes it [rad]."""
 QUARTER = math.pi / 2
 """Turn of the hand that puts its narrow side across the way [rad]."""
-HIGH = (0.2, 0.0, 0.0)
+HIGH_ROUTE = (0.2, 0.0, 0.0)
 """The way to carry a body high over everything; see `ROUTES`."""
 ROUTES = (
     (0.005, QUARTER, 0.0),
     (0.12, 0.0, 0.0),
     (0.005, 0.0, 0.0),
-    HIGH,
+    HIGH_ROUTE,
     (0.02, 0.0, 0.2),
     (0.02, 0.0, -0.2),
     (0.12, QUARTER, 0.0),
 )
 """Ways to carry a body: height above its goal [m], turn of the hand [rad], and the largest distance to the left of the
 straight way [m]. They go through a gap, over an obstacle, straight, high, and around both sides."""
-CARRIED = tuple(dict.fromkeys((HIGH, *ROUTES)))
+CARRIED = tuple(dict.fromkeys((HIGH_ROUTE, *ROUTES)))
 """The same ways, the one over everything first: there the height of the drop matters most."""
 RAISE = 0.008
 """Height above its way at which a body is carried along it [m]: the fingers keep off the table."""

@@ -109,8 +109,8 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any], str]:
     share = Table("a control period of a rollout", "times MuJoCo", title="parts of a rollout", title_justify="left")
     for name, value in parts.items():
         share.add_row(name, f"{value:.2f}")
-    told = {"control_period_ms": periods, "rollout_parts": parts, "spread": spreads, "disturbed_by": noise}
-    return [table, beside, share], {**result, **told}, noise
+    values = {"control_period_ms": periods, "rollout_parts": parts, "spread": spreads, "disturbed_by": noise}
+    return [table, beside, share], {**result, **values}, noise
 
 
 def core(repeats: int) -> dict[str, Measure]:
@@ -193,7 +193,7 @@ def two_arms(repeats: int) -> dict[str, Measure]:
     def play(world: World, actions: Actions) -> Side:
         def steps() -> Iterator[None]:
             world.reset()
-            yield from _sliced(world.apply, actions)
+            yield from _sliced(world.step_filtered, actions)
 
         return steps
 

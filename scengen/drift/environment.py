@@ -125,11 +125,11 @@ def versions_of(setting: str | list[str]) -> list[str]:
     return versions
 
 
-def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) -> Environment:
+def environment(mujoco: str, report: Callable[[str], None] = lambda text: None) -> Environment:
     """The environment with a version of MuJoCo. It is made if it does not exist.
 
     Args:
-        told: called with a line if the environment is made, which takes seconds and needs the package index.
+        report: called with a line if the environment is made, which takes seconds and needs the package index.
 
     Raises:
         BadConfig: there is no such version, or the environment cannot be written.
@@ -143,7 +143,7 @@ def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) ->
         folder.parent.mkdir(parents=True, exist_ok=True)
         with FileLock(folder.with_suffix(f"{folder.suffix}.lock")):
             if not (folder / READY).exists():
-                told(f"making an environment with mujoco {mujoco} in {folder}")
+                report(f"making an environment with mujoco {mujoco} in {folder}")
                 try:
                     _make(folder, mujoco, shared)
                 except BaseException:

@@ -330,8 +330,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._world is None:
             return made
         episode = (self._episode.outcome, self._episode.reason, self._episode.held)
-        told = {"scenario": self._row.id, "world": self._world.state(), "episode": episode}
-        return {**made, **told, "played": [*self._played]}
+        entry = {"scenario": self._row.id, "world": self._world.state(), "episode": episode}
+        return {**made, **entry, "played": [*self._played]}
 
     def _continue(self, progress: Mapping[str, Any]) -> None:
         """Return to a `_progress()` of an environment with the same arguments."""
@@ -370,7 +370,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._played.append(sent)
         self._episode.begin()
         try:
-            self.world.apply(sent)
+            self.world.step_filtered(sent)
         except Unstable as error:
             self._episode.outcome, self._episode.reason = "unstable", str(error)
 

@@ -294,11 +294,11 @@ class RobosuiteEnv(ManipulationEnv):
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:
         """Command the arms; robosuite calls it between mj_step1 and mj_step2 of every physics step."""
         assert len(action) == self.action_dim, f"an action has {self.action_dim} numbers, not {len(action)}"
-        actions = np.split(np.asarray(self.world.joined(action)), len(self.robots))
+        actions = np.split(np.asarray(self.world.with_partner_actions(action)), len(self.robots))
         for number, (robot, own) in enumerate(zip(self.robots, actions, strict=True)):
             # The scene's own arms get a new action in every control period, with any `control_freq`.
             robot.control(own, policy_step=policy_step if number < self._controlled_arms else self._substep == 0)
-        self.world.command(action)
+        self.world.record_grip(action)
         self.world.loop.watch(first=self._substep == 0)
 
     def _update_observables(self, force: bool = False) -> None:

@@ -173,8 +173,8 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         seen, final = self._observed(), dict[int, dict[str, Any]]()
         if self._mode == AutoresetMode.SAME_STEP and (over := terminated | truncated).any():
             for slot in np.flatnonzero(over).tolist():
-                told = {**infos[slot], **(self.envs[slot]._labels() if self._labels else {})}
-                final[slot] = {"final_obs": {name: value[slot] for name, value in seen.items()}, "final_info": told}
+                values = {**infos[slot], **(self.envs[slot]._labels() if self._labels else {})}
+                final[slot] = {"final_obs": {name: value[slot] for name, value in seen.items()}, "final_info": values}
             infos |= self._begin(self._handed_out(over))
             seen = self._observed()
         return seen, rewards, terminated, truncated, self._gathered(infos, final)

@@ -137,8 +137,8 @@ def declared(task: Task) -> dict[str, Any]:
         "shortcuts": {name: shortcut.to_rest for name, shortcut in task.nominal.shortcuts().items()},
     }
     for p in parameters(task.nominal):
-        told = [p.nominal, p.unit, p.low, p.high, p.period, "hidden" if p.hidden else "seen"]
-        found[f"parameter {p.name}"] = told
+        parts = [p.nominal, p.unit, p.low, p.high, p.period, "hidden" if p.hidden else "seen"]
+        found[f"parameter {p.name}"] = parts
     found |= {f"{ID} {name}": quantiles(dist) for name, dist in sorted(task.training.items())}
     for axis in task.axes.values():
         for name, dist in axis.replace.items():
@@ -161,8 +161,8 @@ def _answer(task: Task) -> list[Any]:
 def _questions(task: str) -> str:
     """Hash of the questions and sub-goals of a task; empty if it has none."""
     path = facts_file(task) if task in known_tasks() else None
-    told = yaml.safe_load(path.read_text()) if path else ""
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12] if path else ""
+    questions = yaml.safe_load(path.read_text()) if path else ""
+    return hashlib.sha256(json.dumps(questions, sort_keys=True).encode()).hexdigest()[:12] if path else ""
 
 
 QUANTILES = (1e-9, 0.25, 0.5, 0.75, 1.0 - 1e-9)
@@ -395,8 +395,8 @@ def oracles(task: Task) -> dict[str, list[Any]]:
 
 def made(task: Task) -> dict[str, Any]:
     """With what a behaviour is observed."""
-    told = {"machine": machine(), "fingerprint": fingerprint(), "versions": versions()}
-    return {**told, "text": source_sha256(task.family)}
+    values = {"machine": machine(), "fingerprint": fingerprint(), "versions": versions()}
+    return {**values, "text": source_sha256(task.family)}
 
 
 @cache
@@ -408,8 +408,8 @@ def machine() -> str:
     mujoco.mj_step(model, data, 300)
     numbers = np.sin(np.arange(1.0, 200.0)).reshape(-1, 1) ** np.arange(1, 20)
     product = np.linalg.solve(numbers.T @ numbers + np.eye(19), np.exp(-np.arange(19.0)))
-    told = [binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()]
-    return hashlib.sha256(data.qpos.tobytes() + product.tobytes() + "".join(told).encode()).hexdigest()[:16]
+    parts = [binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()]
+    return hashlib.sha256(data.qpos.tobytes() + product.tobytes() + "".join(parts).encode()).hexdigest()[:16]
 
 
 TUMBLING = """

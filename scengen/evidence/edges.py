@@ -147,8 +147,8 @@ def _along(number: int, start: Scenario, end: Mapping[str, Value], known: Mappin
 
     def at(share: float) -> dict[str, Value]:
         share = min(max(share, 0.0), 1.0)
-        told = {name: begin[name] + share * (value - begin[name]) for name, value in moved.items()}
-        return {name: round(value) if known[name].integer else float(f"{value:.9g}") for name, value in told.items()}
+        entry = {name: begin[name] + share * (value - begin[name]) for name, value in moved.items()}
+        return {name: round(value) if known[name].integer else float(f"{value:.9g}") for name, value in entry.items()}
 
     def ask(share: float) -> Reasons | None:
         return reasons(start, at(share))

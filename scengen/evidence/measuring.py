@@ -23,8 +23,8 @@ def draws_of(task: Task, split: str) -> str:
 
     A row about a task as a whole has the hash of the training split.
     """
-    told = [each for index in range(DRAWS) for each in _draw(task, split or ID, index)]
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()[:12]
+    parts = [each for index in range(DRAWS) for each in _draw(task, split or ID, index)]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
 
 
 def _draw(task: Task, split: str, index: int) -> Iterator[str]:

@@ -38,8 +38,8 @@ class Watched(World):
 
     observer: Observer | None = None
 
-    def apply(self, filtered: NDArray[np.float32]) -> None:
-        super().apply(filtered)
+    def step_filtered(self, filtered: NDArray[np.float32]) -> None:
+        super().step_filtered(filtered)
         if self.observer is not None:
             self.observer(self)
 
@@ -145,8 +145,8 @@ class Stage:
         yield "idle", lambda world: run(scenario, world, _wait, horizon, until_settled=True)
         for name, shortcut in scenario.shortcuts().items():
             for raw in (False, True):
-                told = f"shortcut {name}{', raw' if raw else ''}"
-                yield told, lambda world, s=shortcut, raw=raw: try_shortcut(scenario, world, s, horizon, raw=raw)
+                message = f"shortcut {name}{', raw' if raw else ''}"
+                yield message, lambda world, s=shortcut, raw=raw: try_shortcut(scenario, world, s, horizon, raw=raw)
         for number in range(JITTERED):
             yield f"jitter {number}", lambda world, number=number: self._jittered(world, number)
         if scenario.steps():
@@ -212,8 +212,8 @@ class Stage:
 
 def played(found: Rollout, changes: list[tuple[float, str]]) -> Played:
     """The result of a rollout with the answers of its rules."""
-    told = json.dumps([found.digest, found.outcome, found.reason, found.gave_up, changes])
-    bits = hashlib.sha256(told.encode() + found.actions.tobytes()).hexdigest()[:8]
+    text = json.dumps([found.digest, found.outcome, found.reason, found.gave_up, changes])
+    bits = hashlib.sha256(text.encode() + found.actions.tobytes()).hexdigest()[:8]
     return Played(verdict_of(found), found.seconds, bits)
 
 

@@ -162,7 +162,7 @@ class Probe:
         done = [f"{name} {whole(world.memory[name])}" for name in world.memory.names if world.memory[name]]
         done += [name for name, value in before.items() if not np.array_equal(getattr(data, name), value)]
         done += [f"jam {arm.number}" for arm in _all_arms(world) if world.loop.jammed(arm.number)]
-        done += [f"told {np.sign(arm.told).astype(int).tolist()}" for arm in world.partners]
+        done += [f"told {np.sign(arm.scripted_action).astype(int).tolist()}" for arm in world.partners]
         return ", ".join(done)
 
     def numbers(self) -> str:
@@ -180,7 +180,7 @@ class Probe:
 
     def _written(self) -> str:
         parts = [getattr(self.world.data, name).ravel() for name in ("userdata", *EFFECTS)]
-        parts += [np.asarray(arm.told) for arm in self.world.partners]
+        parts += [np.asarray(arm.scripted_action) for arm in self.world.partners]
         return " ".join(f"{value:.6g}" if abs(value) > 1e-9 else "0" for part in parts for value in part)
 
 

@@ -97,8 +97,8 @@ class TrainingData:
             else:
                 found.append(_trajectory(recording, episode, columns, hands))
         if len(found) < MIN_EPISODES:
-            told = ", ".join(f"{count} {why}" for why, count in left_out.items() if count) or "no episodes"
-            raise BadConfig(f"{folder}: {len(found)} demonstrations to learn from ({told}); at least {MIN_EPISODES}")
+            text = ", ".join(f"{count} {why}" for why, count in left_out.items() if count) or "no episodes"
+            raise BadConfig(f"{folder}: {len(found)} demonstrations to learn from ({text}); at least {MIN_EPISODES}")
         if demonstrations is not None and demonstrations > len(found):
             raise BadConfig(f"demonstrations = {demonstrations}; {folder} has {len(found)} to learn from")
         found = found[:demonstrations]

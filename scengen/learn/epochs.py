@@ -95,8 +95,8 @@ class Training:
         self.losses.append((learned, held_out))
         self.seconds += time.process_time() - started
         if self.kind != KNN:
-            told = {"losses": self._all_losses(), "seconds": np.array([self.seconds], np.float32)}
-            write(self.path, arrays_as_bytes({**self.arrays, **told}))
+            values = {"losses": self._all_losses(), "seconds": np.array([self.seconds], np.float32)}
+            write(self.path, arrays_as_bytes({**self.arrays, **values}))
 
     def _all_losses(self) -> NDArray[np.float32]:
         """Losses of all epochs, shape (epochs, 2); -1 for those to come."""

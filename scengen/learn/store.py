@@ -192,8 +192,8 @@ class StoredPolicy:
         content = arrays_as_bytes(self.arrays)
         settings = replace(self.settings, weights_sha256=sha256(content))
         write(folder / WEIGHTS, content)
-        told = {name: value for name, value in asdict(settings).items() if value is not None}
-        write(folder / SETTINGS, json.dumps({"format": FORMAT, **told}, indent=1, sort_keys=True) + "\n")
+        values = {name: value for name, value in asdict(settings).items() if value is not None}
+        write(folder / SETTINGS, json.dumps({"format": FORMAT, **values}, indent=1, sort_keys=True) + "\n")
         return settings
 
 
@@ -276,9 +276,11 @@ def _members(archive: zipfile.ZipFile, shapes: Mapping[str, tuple[int, ...]]) ->
         with archive.open(entry) as member:
             if np.lib.format.read_magic(member) != (1, 0):
                 raise Broken(f"{name} has another version of the header")
-            told = np.lib.format.read_array_header_1_0(member)
-            if told != (shape, False, np.dtype(np.float32)):
-                raise Broken(f"{name} has the shape {cut(str(told[0]))} and the type {told[2]}, not {shape}, float32")
+            header = np.lib.format.read_array_header_1_0(member)
+            if header != (shape, False, np.dtype(np.float32)):
+                raise Broken(
+                    f"{name} has the shape {cut(str(header[0]))} and the type {header[2]}, not {shape}, float32"
+                )
             content = member.read(4 * prod(shape))
             if len(content) < 4 * prod(shape):
                 raise Broken(f"{name} ends early")

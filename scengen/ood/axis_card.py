@@ -96,12 +96,12 @@ class AxisCard:
 
     def plain(self) -> dict[str, Any]:
         """The card as plain data, for JSON."""
-        told = {"format": FORMAT, **asdict(self)}
-        told["baselines"] = [{**asdict(baseline), "finding": baseline.finding} for baseline in self.baselines]
-        told["boundaries"] = {
+        values = {"format": FORMAT, **asdict(self)}
+        values["baselines"] = [{**asdict(baseline), "finding": baseline.finding} for baseline in self.baselines]
+        values["boundaries"] = {
             k: {**asdict(b), "verdict": b.verdict, "told": str(b)} for k, b in self.boundaries.items()
         }
-        return told
+        return values
 
 
 def read_card(path: Path) -> dict[str, Any]:

@@ -132,8 +132,10 @@ class DemonstrationManifest:
         except (ScengenError, ValueError, KeyError, TypeError, OSError) as error:
             why = " ".join(str(error).split())[:160]
             raise PoolError(f"{path} is damaged; restore it or make the demonstrations again ({why})") from None
-        told = f"{folder} has format {str(version)[:20]} of demonstrations, this scengen reads {DEMONSTRATIONS_FORMAT}"
-        raise PoolError(f"{told}; make them again with the command that made them")
+        message = (
+            f"{folder} has format {str(version)[:20]} of demonstrations, this scengen reads {DEMONSTRATIONS_FORMAT}"
+        )
+        raise PoolError(f"{message}; make them again with the command that made them")
 
     def write(self, folder: Path) -> None:
         """Write the manifest of a folder."""
@@ -182,8 +184,8 @@ def _check(manifest: DemonstrationManifest) -> None:
     if manifest.policy is not None:
         check_text("policy", manifest.policy, MAX_TEXT)
     demand(manifest.operator is None or manifest.policy is None, "an operator and a policy")
-    for source, told in ((TELEOP, manifest.operator), (POLICY, manifest.policy)):
-        demand((told is None) == (source not in config.styles), f"style {source} and its source go together")
+    for source, stated in ((TELEOP, manifest.operator), (POLICY, manifest.policy)):
+        demand((stated is None) == (source not in config.styles), f"style {source} and its source go together")
         demand(source not in config.styles or len(config.styles) == 1, f"{source} stands beside other styles")
     if manifest.failed is not None:
         demand(manifest.failed.file == FAILED, f"failed names another file than {FAILED}")

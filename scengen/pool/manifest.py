@@ -132,8 +132,8 @@ class Manifest:
             raise PoolError(f"{path} is damaged; restore it or generate the pool again ({why})") from None
         newer = isinstance(version, int) and version > FORMAT
         remedy = "install a newer scengen" if newer else "generate it again with the command and seed that made it"
-        told = f"{folder} has pool format {str(version)[:20]}, this scengen reads {FORMAT}"
-        raise PoolError(f"{told}; {remedy} (docs/pools.md, Formats)")
+        message = f"{folder} has pool format {str(version)[:20]}, this scengen reads {FORMAT}"
+        raise PoolError(f"{message}; {remedy} (docs/pools.md, Formats)")
 
     def plain(self) -> dict[str, Any]:
         """Plain data, as a pool stores it."""

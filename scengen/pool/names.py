@@ -72,11 +72,11 @@ def find(text: str, known: Known, name: Callable[[int], Name], where: str) -> in
     if not found:
         raise NoScenario(text, nearest(start, known.alike(start)), _listed(range(len(known)), name), where)
     if len(found) > 1:
-        told = f"{cut(repr(text))} begins {len(found)} ids in {where}; give more characters: {_listed(found, name)}"
-        raise BadConfig(told)
+        message = f"{cut(repr(text))} begins {len(found)} ids in {where}; give more characters: {_listed(found, name)}"
+        raise BadConfig(message)
     if before and not str(called := name(found[0])).startswith(f"{before}/"):
-        told = f"{cut(text)} is {called}: the id counts, the text before it is wrong"
-        warnings.warn(told, Misnamed, stacklevel=3)
+        message = f"{cut(text)} is {called}: the id counts, the text before it is wrong"
+        warnings.warn(message, Misnamed, stacklevel=3)
     return found[0]
 
 

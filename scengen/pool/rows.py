@@ -123,7 +123,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         Raises:
             PoolError: a file cannot be read.
         """
-        return (Name(*told) for told in self.columns("task", "split", "index", "id"))
+        return (Name(*values) for values in self.columns("task", "split", "index", "id"))
 
     def kinds(self, name: str) -> tuple[list[str], NDArray[np.int32]]:
         """The different texts in a column such as `split`, and which of them each row has, shape (n,).

@@ -175,8 +175,8 @@ def _small_columns(shard: Shard, names: Sequence[str]) -> Iterator[pa.RecordBatc
 def _check_count(shard: Shard, count: int, ended: bool) -> None:
     """Raise `PoolError` if a file with so many rows, or more unless it has ended, is not what the manifest says."""
     if count > shard.rows or (ended and count < shard.rows):
-        told = f"more than {shard.rows}" if count > shard.rows else f"{count}"
-        raise PoolError(f"{shard.path} holds {told} rows, and the manifest promises {shard.rows}; restore it")
+        message = f"more than {shard.rows}" if count > shard.rows else f"{count}"
+        raise PoolError(f"{shard.path} holds {message} rows, and the manifest promises {shard.rows}; restore it")
 
 
 # --- files ------------------------------------------------------------------------------------------------------------

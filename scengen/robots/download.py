@@ -25,7 +25,7 @@ def main() -> int:
         print(f"the robot's files are in {folder}")
         if not complete((used := files.place()).folder):
             print(
-                f"but {used.told}, which is not complete, comes first; to use the cache, set {files.VARIABLE}={folder}"
+                f"but {used.label}, which is not complete, comes first; to use the cache, set {files.VARIABLE}={folder}"
             )
     except NoRobot as error:
         print(error, file=sys.stderr)

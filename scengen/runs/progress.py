@@ -57,12 +57,12 @@ class ProgressBar:
             self._first = now, done
         status = self.workers.status if isinstance(self.workers, Executor) else ""
         rate = (done - self._first[1]) / (now - self._first[0]) if now > self._first[0] else 0.0
-        told = ", ".join(text for text in (note, status, f"{rate:.2g}/s" if rate else "") if text)
-        self._progress.update(self._task, completed=done, note=told)
+        message = ", ".join(text for text in (note, status, f"{rate:.2g}/s" if rate else "") if text)
+        self._progress.update(self._task, completed=done, note=message)
         due = now - self._last > LINE_INTERVAL or (done == self.total and self._said != done)
         if due and not self.console.is_terminal:
             self._last, self._said = now, done
             left = (self.total - done) / rate if rate and self.total else 0.0
             end = time.strftime(", ends %a %H:%M", time.localtime(time.time() + left)) if left else ""
             of = "" if self.total is None else f" of {self.total}"
-            self.console.print(f"{self.title}: {done}{of} {told}".rstrip() + end)
+            self.console.print(f"{self.title}: {done}{of} {message}".rstrip() + end)

@@ -188,9 +188,9 @@ def about(name: str, search: Sequence[str] = ()) -> About:
         raise BadConfig(f"{name}.axes = {cut(repr(axes))}; expected a group of settings, {{name: value}}")
     source = paper_source(name, str(words["category"]))
     of_paper = [axis for axis, node in axes.items() if isinstance(node, Mapping) and node.get("source") == source]
-    told = {key: str(value) for key, value in words.items()}
+    values = {key: str(value) for key, value in words.items()}
     return About(
-        name, **told, embodiment=str(head.get("embodiment", EMBODIMENT)), axes=(*axes,), paper_axes=(*of_paper,)
+        name, **values, embodiment=str(head.get("embodiment", EMBODIMENT)), axes=(*axes,), paper_axes=(*of_paper,)
     )
 
 

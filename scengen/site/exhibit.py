@@ -276,16 +276,16 @@ def _endings(row: PoolRow, check: str) -> list[Ending]:
     """How the plans that must fail have failed, by the certificate, which may be a stranger's."""
     found = []
     for numbers in (each.numbers for each in row.certificate.checks if each.name == check):
-        for plan, told in numbers.items():
-            ways = told.items() if isinstance(told, Mapping) and "outcome" not in told else [("", told)]
+        for plan, outcomes in numbers.items():
+            ways = outcomes.items() if isinstance(outcomes, Mapping) and "outcome" not in outcomes else [("", outcomes)]
             found += [_ending(plan, how, end) for how, end in ways if isinstance(end, Mapping)]
     return found
 
 
 def _ending(plan: str, how: str, end: Mapping[str, Any]) -> Ending:
     seconds = end.get("seconds")
-    told = (str(end.get("outcome", "")), str(end.get("reason", "")))
-    return Ending(str(plan), str(how), *told, float(seconds) if isinstance(seconds, (int, float)) else 0.0)
+    verdict = (str(end.get("outcome", "")), str(end.get("reason", "")))
+    return Ending(str(plan), str(how), *verdict, float(seconds) if isinstance(seconds, (int, float)) else 0.0)
 
 
 def _words(task: Task) -> str:

@@ -124,7 +124,9 @@ class KeyboardTyping(Scenario):
         show_typed(world, "keyboard", k)
         key = self.key(world, k) if self.partner_next(world) and world.memory["waited"] > self.pause(k) else None
         counts = long_enough(world.memory["held_1"], self.hold)
-        partner.tell(keys.type_or_go_home(partner, self.keyboard, "keyboard", key, counts, PARTNER_HOME, self.pace))
+        partner.set_action(
+            keys.type_or_go_home(partner, self.keyboard, "keyboard", key, counts, PARTNER_HOME, self.pace)
+        )
 
     def _judge_press(self, world: World, key: int, arm: Arm) -> None:
         """Judge a key that counts: it is the next letter, and this arm's, or a mistake."""

@@ -322,7 +322,7 @@ class SlipRecovery(Scenario):
             "longest_slip": max((slip.seconds for slip in self.planned), default=0.0),
             "way": way,
             "mass": self.thing.mass,
-            **self.thing.told,
+            **self.thing.features,
             "narrow_side_along_the_way": abs(float(side)) / math.dist(self.start, self.goal),
         }
 

@@ -113,7 +113,7 @@ def _remarks(report: AttackReport, names: Mapping[str, str]) -> list[str]:
 
 def _fixed_answers(prior: Prior) -> str:
     values = ", ".join(f"{value:.3g}" for value in prior.values)
-    told = f"fixed answers {values}: right in {prior.fitted:.1%} of the draws where they were fitted"
+    message = f"fixed answers {values}: right in {prior.fitted:.1%} of the draws where they were fitted"
     if prior.fresh is None or prior.bound is None:
-        return told
-    return f"{told}, in {prior.fresh:.1%} (< {prior.bound:.1%}) of {prior.draws} others"
+        return message
+    return f"{message}, in {prior.fresh:.1%} (< {prior.bound:.1%}) of {prior.draws} others"

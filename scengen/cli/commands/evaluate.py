@@ -32,8 +32,8 @@ def command(arguments: Arguments) -> int:
         every = settings.several()
     results, search = [], search_path(arguments)
     for one in every:
-        if told := other_version(one, search):
-            remark(told)
+        if difference := other_version(one, search):
+            remark(difference)
         with ProgressBar(err, f"evaluate {one.name}", 1, one.workers) as progress_bar:
             results.append(PolicyResult(one, _evaluated(one, progress_bar.of, search)))
     compared = Comparison(results)

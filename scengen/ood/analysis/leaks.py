@@ -95,10 +95,10 @@ def leaks(
     truth = {name: column for name, column in truth.items() if np.ptp(column) > 0.0}
     found = []
     for name, column in truth.items():
-        told = {stream: explained([readings[stream] for _, readings in seen], column) for stream in seen[0][1]}
-        best = max(told, key=told.__getitem__)
-        if told[best] >= MIN_EXPLAINED:
-            found.append(Leak(name, best, told[best]))
+        shares = {stream: explained([readings[stream] for _, readings in seen], column) for stream in seen[0][1]}
+        best = max(shares, key=shares.__getitem__)
+        if shares[best] >= MIN_EXPLAINED:
+            found.append(Leak(name, best, shares[best]))
     found.sort(key=lambda leak: -leak.explained)
     return Leaks(split, len(seen), tuple(truth), tuple(found))
 
@@ -126,8 +126,8 @@ def explained(readings: Sequence[NDArray[np.float64]], column: NDArray[np.float6
         return 0.0
     known = (chosen - chosen[:half].mean(axis=0)) / chosen[:half].std(axis=0)
     inputs = np.hstack([np.ones((len(known), 1)), known, known**2])
-    fitted, told = inputs[:half], column[:half]
-    weights = np.linalg.solve(fitted.T @ fitted + RIDGE * half * np.eye(inputs.shape[1]), fitted.T @ told)
+    fitted, expected = inputs[:half], column[:half]
+    weights = np.linalg.solve(fitted.T @ fitted + RIDGE * half * np.eye(inputs.shape[1]), fitted.T @ expected)
     left = column[half:] - inputs[half:] @ weights
     return max(0.0, 1.0 - float(np.mean(left**2) / np.var(column[half:])))
 
