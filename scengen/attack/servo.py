@@ -131,20 +131,20 @@ def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
     for skew in (0.0, QUARTER):
         take = turned(player, arm, body, skew, 0.0)
         yield Attempt(SERVO, (take, Macro("along", body, (skew, RAISE), arm.number)))
-    asked = asked_of(player, body)
+    asked = must_touch(player, body)
     every = product(range(len(DROPS)), range(len(CARRIED)))
     for drop, route in ((DROPS[i], CARRIED[k]) for i, k in sorted(every, key=sum)):
         goal = bring(player, arm, body, route, drop)
         yield Attempt(SERVO, (pick, goal))
         if asked:
-            yield Attempt(SERVO, (pick, *touched_there(player, arm, body, asked), goal))
+            yield Attempt(SERVO, (pick, *touched_at_goal(player, arm, body, asked), goal))
             yield Attempt(SERVO, (pick, *touched_straight(player, arm, body, asked), goal))
 
 
 def all_carried(player: Player, arm: Arm, bodies: Sequence[str]) -> Iterator[Attempt]:
     """Every handled body in the order of the witness: take it, touch with it what the goal asks for, carry it there."""
-    asked = {body: asked_of(player, body) for body in bodies}
-    touches = (touched_there, touched_straight, untouched) if any(asked.values()) else (untouched,)
+    asked = {body: must_touch(player, body) for body in bodies}
+    touches = (touched_at_goal, touched_straight, untouched) if any(asked.values()) else (untouched,)
     for route, skew, drop, touch in product(CARRIED, (0.0, QUARTER), DROPS, touches):
         moves: list[Macro] = []
         for body in bodies:
@@ -153,7 +153,7 @@ def all_carried(player: Player, arm: Arm, bodies: Sequence[str]) -> Iterator[Att
         yield Attempt(SERVO, tuple(moves))
 
 
-def touched_there(player: Player, arm: Arm, body: str, others: Sequence[str]) -> list[Macro]:
+def touched_at_goal(player: Player, arm: Arm, body: str, others: Sequence[str]) -> list[Macro]:
     """Macros that touch other bodies with the one in the hand, where they touch in the witness, from above."""
     places = [player.trace.place_at(body, body, other) for other in others]
     return [Macro("touch", other, place, arm.number) for other, place in zip(others, places, strict=True)]
@@ -228,7 +228,7 @@ def bring(player: Player, arm: Arm, body: str, route: tuple[float, float, float]
     return Macro("bring", body, (*map(float, player.goal_place(body)), *route, drop), arm.number)
 
 
-def asked_of(player: Player, body: str) -> tuple[str, ...]:
+def must_touch(player: Player, body: str) -> tuple[str, ...]:
     """Bodies of the scene that a body must have touched for the goal, in the order of the witness."""
     asked = {other for pair in player.latches if body in pair for other in pair} - {body}
     pairs = [pair for _, pair in player.trace.events if body in pair]

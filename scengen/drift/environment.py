@@ -169,11 +169,11 @@ def _make(folder: Path, mujoco: str, shared: str) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     venv.EnvBuilder(symlinks=True, with_pip=True).create(folder)
     python = folder / "bin" / "python"
-    asked = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary", ":all:"]
+    options = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary", ":all:"]
     (packages,) = (folder / "lib").glob("python*/site-packages")
     wanted = [f"mujoco=={mujoco}"]
     while wanted:
-        done = subprocess.run([python, "-m", "pip", *asked, *wanted], capture_output=True, text=True)
+        done = subprocess.run([python, "-m", "pip", *options, *wanted], capture_output=True, text=True)
         if done.returncode:
             raise BadConfig(_why_not(mujoco, done.stderr))
         wanted = _missing_parts(packages)

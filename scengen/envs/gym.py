@@ -354,11 +354,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._episode = Episode(self._scenario, self._world, row.horizon, self.rules)
 
     def _play(self, given: NDArray[np.float32]) -> tuple[float, bool, bool, dict[str, Any]]:
-        """Take a step with a valid action, clipped unless there is a filter. Returns what `_told` does."""
+        """Take a step with a valid action, clipped unless there is a filter. Returns what `_answer` does."""
         outcome = None
         for _ in range(self.action_repeat):
             outcome = outcome or self._advance(given)
-        return self._told(outcome)
+        return self._answer(outcome)
 
     def _advance(self, action: NDArray[np.float32]) -> Outcome | None:
         self._simulate(action)
@@ -374,7 +374,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         except Unstable as error:
             self._episode.outcome, self._episode.reason = "unstable", str(error)
 
-    def _told(self, outcome: Outcome | None) -> tuple[float, bool, bool, dict[str, Any]]:
+    def _answer(self, outcome: Outcome | None) -> tuple[float, bool, bool, dict[str, Any]]:
         """Reward, whether the episode terminates, whether it is truncated, and the info.
 
         Args:

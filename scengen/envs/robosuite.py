@@ -281,7 +281,7 @@ class RobosuiteEnv(ManipulationEnv):
         self.sim.data.qacc_warmstart[:] = 0.0  # the constructors of the controllers have changed it
         self.world.filter.reset()
         self.episode, self._substep = Episode(self.scenario, self.world, self.row.horizon, self.rules), 0
-        self._begun = False
+        self._started = False
 
     def _close_jaw(self) -> None:
         """Close the jaw of the first arm on what it holds at the start."""
@@ -336,8 +336,8 @@ class RobosuiteEnv(ManipulationEnv):
 
     def _begin_episode(self) -> None:
         """Run the scene's events of the first control period, unless they have been run."""
-        if not self._begun:
-            self._begun = True
+        if not self._started:
+            self._started = True
             self.episode.begin()
 
     def _end_period(self) -> None:

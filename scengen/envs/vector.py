@@ -89,7 +89,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         self._rows, self._next = first._rows, 0
         self._labels = False
         self._terminated, self._truncated = np.zeros((2, self.num_envs), np.bool_)
-        self._begun = False
+        self._started = False
         self._infos: dict[str, NDArray[Any]] = {
             **{f"_{name}": np.ones(self.num_envs, np.bool_) for name in INFOS},
             **{name: np.zeros(self.num_envs, np.bool_) for name in ("success", "is_success")},
@@ -124,12 +124,12 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             raise UnknownName("reset option", unknown.pop(), (*RESET_OPTIONS, MASK))
         mask = self._mask((options or {}).get(MASK))
         self._labels = bool((options or {}).get("labels"))
-        first = not self._begun
+        first = not self._started
         fresh = np.flatnonzero(mask | first).tolist()
         numbers = self._numbers(seed, (options or {}).get("scenario"), fresh)
         infos = self._begin({slot: self._rows[number] for slot, number in numbers.items()})
         self._terminated, self._truncated = self._terminated & ~mask, (self._truncated | first) & ~mask
-        self._begun = True
+        self._started = True
         return self._observed(), self._gathered(infos)
 
     def step(self, actions: ArrayLike) -> Steps:
@@ -142,7 +142,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             ValueError: the actions have another shape, or one is not finite. Nothing is simulated then.
         """
         given = self._checked(actions)
-        if not self._begun:
+        if not self._started:
             raise BadConfig("no scenario is running; call reset first")
         over = self._terminated | self._truncated
         fresh = self._handed_out(over) if self._mode == AutoresetMode.NEXT_STEP else {}
@@ -164,7 +164,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
                     times[slot] = env.world.time
             for slot, outcome in outcomes.items():
                 if outcome is not None:
-                    rewards[slot], terminated[slot], truncated[slot], infos[slot] = self.envs[slot]._told(outcome)
+                    rewards[slot], terminated[slot], truncated[slot], infos[slot] = self.envs[slot]._answer(outcome)
 
         self._each(play, [slot for slot in range(self.num_envs) if slot not in fresh and not stays[slot]])
         if fresh:

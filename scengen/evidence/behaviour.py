@@ -263,7 +263,7 @@ def unpacked(text: str) -> NDArray[np.float64]:
     return np.frombuffer(zlib.decompress(base64.b85decode(text)), np.float32).astype(np.float64)
 
 
-def asked(stage: Stage, stored: Behaviour) -> dict[str, Any]:
+def current_rules(stage: Stage, stored: Behaviour) -> dict[str, Any]:
     """Entries `answers`, `states` and `limits` of a behaviour as the rules answer now."""
     book, scenario, world = Book(list(stored.answers)), stage.scenario, stage.world
     contacts = [rules.Contact(*each) for each in stored.contacts]
@@ -300,7 +300,7 @@ def explored(stage: Stage, states: Sequence[NDArray[np.float64]]) -> dict[str, A
     """Entries `answers`, `contacts`, `states` and `limits` of a new behaviour."""
     book, scenario, world = Book(), stage.scenario, stage.world
     texts = [packed(state) for state in states]
-    contacts = rules.contacts_asked(scenario, world, [unpacked(text) for text in texts])
+    contacts = rules.contacts_of_rules(scenario, world, [unpacked(text) for text in texts])
     along, described_states, limits = list(rules.coordinates(world)), [], []
     counts: dict[Any, int] = {}
     for number, text in enumerate(texts):

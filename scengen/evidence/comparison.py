@@ -14,7 +14,7 @@ from .behaviour import (
     TRAINING_DRAWS,
     Behaviour,
     Cheat,
-    asked,
+    current_rules,
     declared,
     drawn,
     is_core,
@@ -130,7 +130,7 @@ def without_rollouts(task: Task, stored: Behaviour) -> Iterator[Difference]:
     if any(each.kind == "scene" and each.what == f"{ID} 0" for each in found):
         return  # the stored states belong to another scene
     if stage := _stage(task, {}):
-        yield from _rules(task.name, stored, asked(stage, stored))
+        yield from _rules(task.name, stored, current_rules(stage, stored))
 
 
 def _described(task: Task, stored: Behaviour) -> Iterator[Difference]:

@@ -375,7 +375,7 @@ def chosen(start: State, last: Mapping[str, State], first: Mapping[str, State]) 
     return [start, *(known[answer] for answer in order), *others][:MAX_STATES]
 
 
-def contacts_asked(scenario: Scenario, world: World, states: Sequence[NDArray[np.float64]]) -> list[Contact]:
+def contacts_of_rules(scenario: Scenario, world: World, states: Sequence[NDArray[np.float64]]) -> list[Contact]:
     """Questions about contact that the rules ask in some states."""
     recording = RecordingWorld.twin(world)
     for state in states:

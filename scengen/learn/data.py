@@ -122,18 +122,18 @@ def entry_names(stream: str, names: Sequence[str], shape: Sequence[int]) -> tupl
     return tuple(names) if len(shape) < 2 else tuple(f"{stream}.{i}" for i in range(prod(shape)))
 
 
-def _task(recording: Recording, asked: str | None) -> str:
+def _task(recording: Recording, wanted: str | None) -> str:
     """The task whose demonstrations are read.
 
     Raises:
         ScengenError: the recording has none of it, or has several tasks and none is asked for.
     """
     tasks = sorted({str(row["scengen/task"]) for row in recording.episodes})
-    if asked is not None and asked not in tasks:
-        raise UnknownName(f"task in {recording.folder}", asked, tasks)
-    if asked is None and len(tasks) > 1:
+    if wanted is not None and wanted not in tasks:
+        raise UnknownName(f"task in {recording.folder}", wanted, tasks)
+    if wanted is None and len(tasks) > 1:
         raise BadConfig(f"{recording.folder} holds demonstrations of {' and '.join(tasks)}; say task=...")
-    return asked or tasks[0]
+    return wanted or tasks[0]
 
 
 def _task_version(recording: Recording, task: str) -> int | None:

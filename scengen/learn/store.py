@@ -178,7 +178,7 @@ class StoredPolicy:
                 raise Broken(f"its sha256 is not that in {SETTINGS}")
             arrays = read_arrays(path, settings.shapes)
         except (OSError, ValueError) as error:
-            raise PoolError(f"{path} is damaged ({_told(error)}); restore it, or train the policy again") from None
+            raise PoolError(f"{path} is damaged ({_cause(error)}); restore it, or train the policy again") from None
         return cls(settings, arrays)
 
     @cached_property
@@ -220,7 +220,7 @@ def read_settings(folder: str | Path) -> PolicySettings:
             settings.check()
             return settings
     except (ScengenError, ValueError, OSError) as error:
-        raise PoolError(f"{path} is damaged ({_told(error)}); restore it, or train the policy again") from None
+        raise PoolError(f"{path} is damaged ({_cause(error)}); restore it, or train the policy again") from None
     raise BadConfig(f"{path} has format {cut(repr(version), 20)}, this scengen reads {FORMAT}; train the policy again")
 
 
@@ -258,7 +258,7 @@ def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, 
         with zipfile.ZipFile(path) as archive:
             found = _members(archive, shapes)
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
-        raise Broken(_told(error)) from None
+        raise Broken(_cause(error)) from None
     for name, array in found.items():
         if not (np.isfinite(array).all() or (name == "input_scale" and (array > 0).all())):
             raise Broken(f"{name} has numbers that are not finite")
@@ -288,5 +288,5 @@ def _members(archive: zipfile.ZipFile, shapes: Mapping[str, tuple[int, ...]]) ->
     return found
 
 
-def _told(error: Exception) -> str:
+def _cause(error: Exception) -> str:
     return cut(" ".join(str(error).split()), 160)

@@ -55,7 +55,7 @@ class Camera:
         Args:
             width: width of the pictures [pixels], at most `opengl.LARGEST_EDGE`.
             height: height of the pictures [pixels], likewise.
-            view: such as that of `fitted` or of `twins.telling`.
+            view: such as that of `fitted` or of `twins.comparison_view`.
 
         Raises:
             BadConfig: pictures cannot have this size.

@@ -59,8 +59,8 @@ def wheel(folder: Path) -> Path:
     Raises:
         NoRobot: pip fails.
     """
-    asked = ["--no-deps", "--only-binary", ":all:", "--quiet", "--disable-pip-version-check", "--dest", str(folder)]
-    line = [sys.executable, "-m", "pip", "download", *asked, f"robosuite=={ROBOSUITE}"]
+    options = ["--no-deps", "--only-binary", ":all:", "--quiet", "--disable-pip-version-check", "--dest", str(folder)]
+    line = [sys.executable, "-m", "pip", "download", *options, f"robosuite=={ROBOSUITE}"]
     done = subprocess.run(line, capture_output=True, text=True, errors="replace")
     found = list(folder.glob("*.whl"))
     if done.returncode or not found:

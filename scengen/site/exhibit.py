@@ -16,7 +16,7 @@ from ..errors import BadConfig, Infeasible, ScengenError
 from ..pictures import film
 from ..pictures.render import Picture, camera, encode
 from ..pictures.sheet import moved
-from ..pictures.twins import telling, twin_pictures
+from ..pictures.twins import comparison_view, twin_pictures
 from ..pool import PoolRow
 from ..runs.generate import row_of
 from ..samplers.axis import Axis
@@ -241,7 +241,7 @@ def _pair(task: Task, axis: Axis, folder: Path, stem: str) -> Pair:
         return Pair(axis.name, "", [], False)
     scenarios = [task.draw(ID, SEED, index).scenario, *(draw.scenario for draw in draws)]
     worlds = [World.load(rebuild(scenario), task.embodiment, visual=True) for scenario in scenarios]
-    pictures = twin_pictures(*worlds, size=TWIN, view=telling(worlds, TWIN[0] / TWIN[1]))
+    pictures = twin_pictures(*worlds, size=TWIN, view=comparison_view(worlds, TWIN[0] / TWIN[1]))
     files = [f"{stem}-{number}.webp" for number in range(len(pictures))]
     for name, picture in zip(files, pictures, strict=True):
         _save(folder / name, picture)

@@ -46,8 +46,8 @@ def command(arguments: Arguments) -> int:
 def _of_tasks(module: ModuleType, arguments: Arguments, chosen: bool) -> list[object]:
     """The chosen tasks, or all."""
     others = [argument for argument in arguments if not argument.startswith(("pool=", "to=", "task="))]
-    asked = compose.combinations("site", arguments if chosen else [*arguments, "task=all"])
-    names = [compose.chosen_task("site", one.overrides) for one in asked]
+    requested = compose.combinations("site", arguments if chosen else [*arguments, "task=all"])
+    names = [compose.chosen_task("site", one.overrides) for one in requested]
     return [module.Shown(compose.load_task(name, others)) for name in filter(None, names)]
 
 

@@ -72,8 +72,8 @@ def _judged(
         ScengenError: the checks do not run there, or run with another version.
     """
     folders = [str(pool.folder) for pool in pools]
-    asked = {name: getattr(settings, name) for name in ("level", "n", "workers", "limit_seconds", "limit_mb")}
-    answers = where.lines(MODULE, {"pools": folders, "search": list(search), **asked})
+    requested = {name: getattr(settings, name) for name in ("level", "n", "workers", "limit_seconds", "limit_mb")}
+    answers = where.lines(MODULE, {"pools": folders, "search": list(search), **requested})
     about = next(answers)
     if about["mujoco"] != where.mujoco:
         raise ScengenError(
