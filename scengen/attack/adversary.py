@@ -46,7 +46,7 @@ the last one."""
 TIERS = tuple(TIER_SHARES)
 """All tiers, in the order in which they are played."""
 LEAKS = "leaks"
-"""Tier of observations that tell hidden parameters. It plays nothing, see `scengen.ood.analysis.leaks`."""
+"""Tier of observations that reveal hidden parameters. It plays nothing, see `scengen.ood.analysis.leaks`."""
 RATED = (
     *(tier for tier in TIERS if tier not in (PRIOR, MEMORY)),
     *(f"{PRIOR}_{count}" for count in GUESSES),

@@ -1,7 +1,8 @@
 """Tier of detours: on the way, something is done that the oracle does not do, and its solution goes on from there.
 
-A rule that nobody can break without losing is no rule. An attempt makes a move beside its place, presses what it holds
-on another body, pushes a body before it is taken, or opens the jaw a little. What has moved is taken where it is now.
+A rule that cannot be broken without losing the episode has no effect. An attempt makes a move beside its place, presses
+what it holds on another body, pushes a body before it is taken, or opens the jaw a little. What has moved is taken
+where it is now.
 """
 
 from collections.abc import Iterator

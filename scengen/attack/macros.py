@@ -377,6 +377,6 @@ def _lower_until_contact(field: MacroContext, target: str, farthest: float, spee
 
 
 def _push_blindly(arm: Arm, velocity: Vec3, seconds: float) -> Plan:
-    """Push at a constant velocity for a time [s], whatever is in the way."""
+    """Push at a constant velocity for a time [s], without stopping at contact."""
     world, end = arm.world, arm.world.time + seconds - Loop.PERIOD / 2
     yield from push(arm, velocity, lambda: world.time > end, give_up=seconds + 1.0)

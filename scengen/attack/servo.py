@@ -97,7 +97,7 @@ def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
 def stopped(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
     """Stop a hinged body that moves by itself where it is fastest, and bring it to where the witness takes it.
 
-    Or pursue, press down and block it wherever it is.
+    Or pursue it, press it down and block it at its current place.
     """
     if place := player.trace.hand_at(arm.number, body):
         lowest = tuple(map(float, fastest_place(player, body)))
@@ -236,7 +236,7 @@ def must_touch(player: Player, body: str) -> tuple[str, ...]:
 
 
 def fastest_place(player: Player, body: str) -> Vec3:
-    """Where a body that nobody touches is fastest in the first seconds [m]: the lowest place of a pendulum."""
+    """Place at which a body that is not touched is fastest in the first seconds [m]: the lowest place of a pendulum."""
     world = player.world
     seen = [(float(np.linalg.norm(world.velocity(body)[3:])), *world.com(body)) for _ in player.idle(IDLE_TIME)]
     return np.array(max(seen)[1:])

@@ -113,7 +113,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     Reward: 1 when the goal is reached, else 0. `terminated` on success and on failure, `truncated` at the time limit.
     With `settle` a reached goal counts as in a certificate: it must still hold after the robot has been idle for one
     second, which is simulated within the last step.
-    `info` holds `success`, `is_success`, `time` [s], and at the end `reason`: nothing that tells scenarios apart. After
+    `info` holds `success`, `is_success`, `time` [s], and at the end `reason`: nothing that identifies a scenario. After
     `reset(options={"labels": True})` it also holds `scenario`, `scene_sha256`, `split` and `axes`, for evaluators.
 
     Threads may share an environment. Their calls run one after the other.
@@ -492,7 +492,7 @@ def clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) ->
 
 
 def _installed(task: str) -> int:
-    """Version of a task; 1 if its file cannot be read, of which an error tells when the task is loaded."""
+    """Version of a task; 1 if its file cannot be read, which raises an error when the task is loaded."""
     with suppress(ScengenError):
         return task_files.version(task)
     return 1

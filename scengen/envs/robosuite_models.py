@@ -19,7 +19,7 @@ from ..robots import panda, suction
 from ..sim import scene_text
 
 REMEDY = "run pip install 'scengen[robosuite]', in an environment of its own"
-"""Remedy for whatever keeps robosuite's environments from running."""
+"""Remedy for every fault that keeps robosuite's environments from running."""
 
 
 class NoRobosuite(ScengenError, ImportError):

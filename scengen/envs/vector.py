@@ -114,7 +114,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             seed: number of the first slot's scenario, or the numbers for all slots; None for those that come next.
             options: `scenario` names the scenario of all slots, or of each; `labels` adds to `info` which scenario
                 runs, in later episodes too; `reset_mask`, shape (num_envs,), chooses the slots that begin an episode.
-                The episodes of the others go on; in the first reset they are over as soon as they have begun.
+                The episodes of the others go on; in the first reset they are over as soon as they start.
 
         Raises:
             UnknownName: there is no such scenario or option.
@@ -305,7 +305,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         """The infos of the slots in arrays, as Gymnasium's vector environments give them.
 
         Args:
-            infos: infos of the slots whose episodes have begun or ended.
+            infos: infos of the slots whose episodes have started or ended.
             final: ends of the episodes that others have followed.
         """
         found: dict[str, Any] = {}

@@ -71,7 +71,7 @@ class Frozen:
         """
         found = LINE.fullmatch(line)
         if not found:
-            raise BadConfig(f"{where}: {cut(line)!r} is no scenario; it must be an index, an id and a sha256")
+            raise BadConfig(f"{where}: {cut(line)!r} is not a scenario; it must be an index, an id and a sha256")
         return cls(int(found[1]), found[2], found[3])
 
 
@@ -292,7 +292,7 @@ def check_pool(edition: Edition, pool: Pool) -> str:
         if (a.index, a.id) == (b.index, b.id):
             what = f"the scene of index {a.index}, {a.id}, is another one"
     remedy = (
-        "scengen edition tells whether this version draws something else; if not, move the pool aside to make it "
+        "scengen edition shows whether this version draws something else; if not, move the pool aside to make it "
         "again, or take the pools of the edition's authors: certificates can differ between machines"
     )
     raise PoolError(f"{pool.folder} is not set {key} of edition {edition.name}: {what}; {remedy}")

@@ -87,7 +87,7 @@ class Oracle:
         self.identity = inspect.getsource(env.task.family)
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin the plan anew."""
+        """Start the plan again."""
         self.plan = self.env.scenario.oracle(self.env.world)
         self.filter.reset()
 

@@ -69,8 +69,8 @@ def evaluate(
     path = settings.folder / "episodes.jsonl"
     if settings.remote and settings.version is None and not settings.fresh and path.exists():
         why = f"{path} holds episodes of an earlier run, and a server does not say which weights it serves"
-        raise BadConfig(f"{why}; say fresh=true to begin anew, or version=NAME from the start to be able to continue")
-    remedy = "say fresh=true to begin anew (old episodes are moved aside), or choose another to="
+        raise BadConfig(f"{why}; pass fresh=true to start again, or version=NAME from the start to be able to continue")
+    remedy = "pass fresh=true to start again (old episodes are moved aside), or choose another to="
     with closing(PolicyPlayer(settings, search)) as player:
         versions = {a["task"]: a["task_version"] for a in about.values()}
         depends = {**_identity(settings, pools), "task_versions": versions, "code": player.identities({*versions})}

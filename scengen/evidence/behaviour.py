@@ -1,7 +1,7 @@
 """Stored behaviour of a task: what it declares and draws, what its rules say, and how rollouts end.
 
 The file `conf/behaviour/<task>.json` says what version N of a task is. As long as a task behaves like its file, every
-figure that was measured on version N stands, whatever was renamed or moved in the code.
+figure that was measured on version N remains valid, also if code was renamed or moved.
 """
 
 import base64
@@ -347,7 +347,7 @@ def _unsteady(flag: bool) -> list[str]:
 
 
 def observe(task: Task, cheats: Mapping[str, Cheat], steady: bool = True) -> Behaviour:
-    """Observe all of a task's behaviour anew, as a file stores it.
+    """Observe all of a task's behaviour again, as a file stores it.
 
     Args:
         cheats: kept cheats of the task by name.

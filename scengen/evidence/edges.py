@@ -92,7 +92,7 @@ def edges(task: Task, starts: Sequence[Scenario], seed: int) -> list[Edge]:
 
 
 def reasons(start: Scenario, changed: Mapping[str, Value]) -> Reasons | None:
-    """Reasons of all refutations of a scenario with some parameters changed, whatever comes first.
+    """Reasons of all refutations of a scenario with some parameters changed, in any order.
 
     The kind of error is the last one if parameters are so strange that a later constraint cannot be asked. None if they
     are out of bounds.

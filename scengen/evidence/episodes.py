@@ -1,4 +1,4 @@
-"""What an episode makes of the answers of a goal and its failure, whatever the task is."""
+"""How an episode combines the answers of a goal and its failure, for any task."""
 
 import hashlib
 import json

@@ -100,7 +100,7 @@ def latest(kind: Kind, task: str, **made_with: Any) -> dict[str, Evidence]:
 
 
 def write(row: Evidence) -> None:
-    """Add a row to the ledger. It replaces the row of the same place, whatever version that is about."""
+    """Add a row to the ledger. It replaces the row of the same place, of any version."""
     path = folder() / row.kind / f"{row.task}.jsonl"
     path.parent.mkdir(parents=True, exist_ok=True)
     with _locked(path.parent):

@@ -13,7 +13,7 @@ from . import ledger
 from .ledger import Evidence, Kind
 
 DRAWS = 6
-"""Number of draws of a split in the hash that tells its scenarios from others. Other distributions differ in each."""
+"""Number of draws of a split in the hash that identifies its scenarios. Other distributions differ in each."""
 SEED = 0
 """Seed of these draws."""
 

@@ -64,7 +64,7 @@ class Played:
 
 
 OnChange = Callable[[World, str, NDArray[np.float64], str], None]
-"""Function that is told when the rules change their answer."""
+"""Function that is called when the rules change their answer."""
 
 
 @dataclass
@@ -218,7 +218,7 @@ def played(found: Rollout, changes: list[tuple[float, str]]) -> Played:
 
 
 def verdict_of(found: Rollout) -> str:
-    """Outcome of a rollout, and the kind of reason of a failure. Why a plan gave up is no rule of the task."""
+    """Outcome of a rollout, and the kind of reason of a failure. Why a plan gave up is not a rule of the task."""
     return f"failure: {without_numbers(found.reason)}" if found.outcome == "failure" else found.outcome
 
 

@@ -71,7 +71,7 @@ class Coordinate:
 
     @property
     def line(self) -> tuple[str, str, int]:
-        """The coordinate whatever its direction."""
+        """The coordinate without its direction."""
         return self.kind, self.of, self.axis
 
 
@@ -237,7 +237,7 @@ def coordinates(world: World) -> Iterator[Coordinate]:
         *(("memory", name, 0) for name in world.memory.names),
         ("time", "", 0),
     ]
-    for kind, of, axis in sorted(axes):  # whatever the order of bodies and memory
+    for kind, of, axis in sorted(axes):  # independent of the order of bodies and memory
         yield from (Coordinate(kind, of, axis, sign) for sign in (1, -1))
 
 
@@ -334,8 +334,8 @@ class Limit:
 
     @property
     def kind(self) -> tuple[Any, ...]:
-        """What changes at the limit, and along which line; with other contacts than those of the state, whatever the
-        body is."""
+        """What changes at the limit, and along which line; with other contacts than those of the state, for any
+        body."""
         place, line = self.place, self.place.coordinate.line
         sides = ({part for answer in side for part in answer.split(", ")} for side in (self.before, self.after))
         return frozenset(set.symmetric_difference(*sides)), *(line if place.contacts == "same" else (line[0],))

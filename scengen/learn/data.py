@@ -44,7 +44,7 @@ class TrainingData:
 
     task: str
     task_version: int | None
-    """Version of the task; None in recordings that do not tell it."""
+    """Version of the task; None in recordings that do not state it."""
     embodiment: str
     rate: int
     """Rows per second, a divisor of 100."""
@@ -137,10 +137,10 @@ def _task(recording: Recording, wanted: str | None) -> str:
 
 
 def _task_version(recording: Recording, task: str) -> int | None:
-    """The version of the task of which a recording is; None if its episodes do not tell it.
+    """The version of the task of which a recording is; None if its episodes do not state it.
 
     Raises:
-        PoolError: the episodes tell several versions, or something else.
+        PoolError: the episodes state several versions, or something else.
     """
     first, *others = (row.get(TASK_VERSION) for row in recording.episodes if row["scengen/task"] == task)
     if all(other == first for other in others) and (first is None or (isinstance(first, int) and first >= 1)):

@@ -52,7 +52,7 @@ class Training:
         """Begin, or continue from a file.
 
         Args:
-            path: file of the weights after the last epoch; its name tells trainings apart.
+            path: file of the weights after the last epoch; its name identifies the training.
             kind: name of the policy.
             hidden: units of the hidden layers.
             members: number of perceptrons.

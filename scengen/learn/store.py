@@ -67,7 +67,7 @@ class PolicySettings:
     """Name of the policy, one of `models.KINDS`."""
     task: str
     task_version: int | None
-    """Version of the task; None if the recording did not tell it."""
+    """Version of the task; None if the recording did not state it."""
     embodiment: str
     rate: int
     """Actions per second, a divisor of 100."""
@@ -252,7 +252,7 @@ def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, 
     """Arrays of known shapes. The shape in a header is compared before memory is taken for it.
 
     Raises:
-        Broken: an array is missing, or another one than expected, or the file is no archive.
+        Broken: an array is missing, or another one than expected, or the file is not an archive.
     """
     try:
         with zipfile.ZipFile(path) as archive:

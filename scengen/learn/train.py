@@ -112,7 +112,7 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
         try:
             run = Training(path, settings.policy, hidden, members, samples, validation, epochs, limit, settings.seed)
         except (Broken, ValueError, OSError) as error:
-            raise BadConfig(f"{path} is damaged ({cut(str(error))}); delete it to begin anew") from None
+            raise BadConfig(f"{path} is damaged ({cut(str(error))}); delete it to start again") from None
         earlier = len(run.losses)
         while run.share < 1.0:
             run.advance()

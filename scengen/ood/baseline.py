@@ -97,7 +97,9 @@ class Baseline:
             n, training, here, both = (int(record[name]) for name in COUNTS)
             name, control, own = str(record["name"]), str(record["control"]), float(record["own"])
         except (KeyError, TypeError, ValueError):
-            raise BadConfig(f"{dict(record)} is no record of a baseline; it needs name, control, own, counts") from None
+            raise BadConfig(
+                f"{dict(record)} is not a record of a baseline; it needs name, control, own, counts"
+            ) from None
         arms = {
             (True, True): both,
             (True, False): training - both,

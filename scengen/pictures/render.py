@@ -47,7 +47,7 @@ class Camera:
     """A renderer for one world. Any thread may take pictures."""
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError("a Camera holds a context of OpenGL and cannot be copied or pickled; make Camera(world) anew")
+        raise TypeError("a Camera holds a context of OpenGL and cannot be copied or pickled; make a new Camera(world)")
 
     def __init__(self, world: World, width: int = 320, height: int = 240, view: MjvCamera | None = None):
         """Start with a view, by default the fitted one of the scene from the direction that hides least of it.

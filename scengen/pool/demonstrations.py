@@ -120,7 +120,7 @@ class DemonstrationManifest:
         path = folder / DEMONSTRATIONS
         if not path.is_file():
             begun = Path(f"{folder}.run").is_dir()
-            hint = "a run was begun there; repeat its command to finish it" if begun else "see scengen demos"
+            hint = "a run was started there; repeat its command to finish it" if begun else "see scengen demos"
             raise PoolError(f"no demonstrations at {folder}: {DEMONSTRATIONS} is missing; {hint}")
         try:
             plain = dict(check_mapping("the manifest", read_json_file(path)))

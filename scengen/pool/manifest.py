@@ -120,7 +120,7 @@ class Manifest:
         path = folder / MANIFEST
         if not path.is_file():
             begun = Path(f"{folder}.run").is_dir()
-            hint = "a run was begun there; repeat its command to finish it" if begun else "see scengen generate"
+            hint = "a run was started there; repeat its command to finish it" if begun else "see scengen generate"
             raise PoolError(f"no pool at {folder}: {MANIFEST} is missing; {hint}")
         try:
             plain = read_json_file(path)

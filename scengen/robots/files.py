@@ -101,7 +101,7 @@ def _named() -> Place | None:
     folder = Path(setting).expanduser().absolute()
     remedy = f"set it to a folder with robosuite {ROBOSUITE}, or unset it"
     if not folder.is_dir():
-        raise NoRobot(f"{VARIABLE} = {cut(setting)}, which is no folder; {remedy}")
+        raise NoRobot(f"{VARIABLE} = {cut(setting)}, which is not a folder; {remedy}")
     inner = (folder / ASSETS, folder / ASSETS.removeprefix("robosuite/"))
     folder = next((each for each in inner if each.is_dir()), folder)
     return Place(folder, f"{cut(str(folder))} ({VARIABLE})", remedy)

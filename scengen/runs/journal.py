@@ -71,7 +71,8 @@ class Journal:
             setting: name of the setting that names the folder, for errors.
 
         Raises:
-            ScengenError: the pool cannot be written, another run is writing it, or a run of another identity was begun.
+            ScengenError: the pool cannot be written, another run is writing it, or a run of another identity was
+                started.
         """
         if not pool.name or pool.name == "..":
             raise PoolError(f"{pool} cannot become a pool; name a folder of its own with {setting}=")
@@ -116,7 +117,7 @@ class Journal:
         if before is not None and begun[0] != text:
             differs = ", ".join(different(before, json.loads(text)))
             raise PoolError(
-                f"{pool} was begun with other settings ({differs}); choose another {self._setting}=, or move it and "
+                f"{pool} was started with other settings ({differs}); choose another {self._setting}=, or move it and "
                 f"{self.folder} aside"
             )
 

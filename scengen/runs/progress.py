@@ -53,7 +53,7 @@ class ProgressBar:
     def show(self, done: int, note: str = "") -> None:
         """Show that `done` of the total are done."""
         now = time.monotonic()
-        if self._first is None or done < self._first[1]:  # other work has begun
+        if self._first is None or done < self._first[1]:  # other work has started
             self._first = now, done
         status = self.workers.status if isinstance(self.workers, Executor) else ""
         rate = (done - self._first[1]) / (now - self._first[0]) if now > self._first[0] else 0.0

@@ -130,7 +130,7 @@ def behaviour_file(name: str, search: Sequence[str] = ()) -> Path:
 def version(name: str, search: Sequence[str] = ()) -> int:
     """Version of a task: the `VERSION` that the class of its family states in its file, which is not imported; else 1.
 
-    A module that cannot be found is version 1, too: an error tells of it when the task is loaded.
+    A module that cannot be found is version 1, too; loading the task raises the error.
 
     Raises:
         UnknownName: there is no such file.

@@ -97,7 +97,7 @@ class Arm:
         return np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.grip])
 
     def jam(self, on: bool) -> None:
-        """Force the gripper open, or switch the suction off, whatever is commanded, until `jam(False)` is called.
+        """Force the gripper open, or switch the suction off, against any command until `jam(False)` is called.
 
         The jam acts in every physics step and belongs to the state.
 

@@ -49,7 +49,7 @@ class World:
     partners: tuple[Arm, ...] = field(init=False)
     """Arms that events move (`Arm.set_action`)."""
     memory: Memory = field(init=False)
-    """Numbers that record the episode's history, by the names that the scene was told to `remember`; all 0 at the
+    """Numbers that record the episode's history, by the names that the scene declares with `remember`; all 0 at the
     start."""
     style: Style | None = field(default=None, init=False)
     """Style of the moves in this episode; None for those of certificates. A reset removes it."""
@@ -90,7 +90,7 @@ class World:
         return world
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles get a simulation of their own in the same state: addresses are found anew."""
+        """Copies and pickles get a simulation of their own in the same state: addresses are looked up again."""
         return _revived, (type(self), self.model, self.scripted, self.state())
 
     def reset(self) -> None:

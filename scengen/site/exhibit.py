@@ -50,7 +50,7 @@ FRAMES = 8
 VISIBLE = 20
 """Difference of a pixel that a person sees [1/255], and number of such pixels from which pictures differ."""
 Progress = Callable[[str], None]
-"""Function that is told what is made next."""
+"""Function that is called with the name of the next item."""
 
 
 @dataclass(frozen=True)

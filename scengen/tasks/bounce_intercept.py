@@ -9,13 +9,13 @@
      o            .          robot
 
 Bottleneck: the ball is faster than the hand. The place where it can be caught depends on the place of the bounce and on
-the speed that the wall returns. Even on a smooth floor the path is no mirror image: the wall takes a sixth of the speed
-along its normal, and nothing of the speed along the wall.
+the speed that the wall returns. Even on a smooth floor the path is not a mirror image: the wall takes a sixth of the
+speed along its normal, and nothing of the speed along the wall.
 
 Decisions, where the paper (App. B, T13) is silent:
 
 * The floor is a smooth mat, on which the ball slides without turning. A ball that rolls keeps its spin in the bounce,
-  slips, and ends with 2/7 of the speed before and 5/7 of that after it, which is no mirror image at all. That is an
+  slips, and ends with 2/7 of the speed before and 5/7 of that after it, which is not a mirror image at all. That is an
   axis.
 * The walls take 12 to 20 % of the speed in training, like fresh cushions; a bounce takes 22 ms.
 * The hand may be anywhere, also between the walls. If it touches the ball before the ball has met a wall, the episode

@@ -102,7 +102,8 @@ class LaunchedBall(Scenario):
         return inside and closed and world.touching(ROBOT, "ball")
 
     def mishandled(self, world: World) -> str | None:
-        """Reason why the first touch of the ball was no catch by a hand that waited for it, or None. Rules of ours."""
+        """Reason why the first touch of the ball was not a catch by a hand that waited for it, or None. Rules of
+        ours."""
         memory = world.memory
         if not memory["first_touch"]:
             return None

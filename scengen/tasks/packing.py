@@ -213,7 +213,7 @@ class Packing(Scenario):
         }
 
     def _place_all(self, world: World, pose: Callable[[int], tuple[Vec3, float]]) -> Plan:
-        """Press each piece down softly at a pose and let go, wherever it comes to lie."""
+        """Press each piece down softly at a pose and let go, at whatever place results."""
         for i in range(self.count):
             lies = partial(self.lies, world, i)
             yield from fitting.lay(world.arm, f"piece_{i}", self.face(i), *pose(i), self.thickness, lies)

@@ -65,8 +65,8 @@ MISS_SHARE = 0.9
 """Gap of a jaw that has closed on nothing, as a share of the bob's diameter. At 60 % a jaw that opened and closed
 without looking caught every fifth bob."""
 WIDE_GAP = 0.065
-"""Gap from which on a jaw is wide open [m]. An open jaw that is told to close for 50 ms, one step of a policy at 20 Hz,
-and to open again stays wider. A jaw kept at 46 or 54 mm grasped a bob that it saw turn; at 62 mm it was late."""
+"""Gap from which on a jaw is wide open [m]. An open jaw that is commanded to close for 50 ms, one step of a policy at
+20 Hz, and to open again stays wider. A jaw kept at 46 or 54 mm grasped a bob that it saw turn; at 62 mm it was late."""
 MAX_BREAK = 0.2  # time for which pads may lose a bob that bounces between them [s]: longer than 0.09 s, see `jaw`
 HAND_TILT = 65.0
 """Angle of the hand below the horizontal [deg]. At 30 it would look along the bob's path, but below 60 it drifts away
@@ -104,7 +104,7 @@ class PendulumGrasp(Scenario):
         return scene
 
     def events(self, world: World) -> None:
-        """At the start, give the bob the speed from which it reaches the amplitude, whatever its angle.
+        """At the start, give the bob the speed from which it reaches the amplitude, at any angle.
 
         Remember when the jaw was wide open, when it touched the bob [s], and whether it has opened again without it.
         """
@@ -144,7 +144,7 @@ class PendulumGrasp(Scenario):
         return Strict("the jaw did not close from wide open") if self.narrow(world) else None
 
     def missed(self, world: World) -> bool:
-        """Whether a jaw that was wide open has begun to close and not met the bob in time. A rule of ours."""
+        """Whether a jaw that was wide open has started to close and has not touched the bob in time. A rule of ours."""
         memory = world.memory
         met = memory["touch"] > memory["wide"] or world.touching(ROBOT, BOB)
         late = world.time - memory["wide"] > self.closing_time
@@ -298,7 +298,7 @@ class PendulumGrasp(Scenario):
     # --- geometry -------------------------------------------------------------------------
 
     def _seen_at_start(self) -> str:
-        """Where the bob is at the start, in words; below the axle within 4 deg, where pictures do not tell the side."""
+        """Where the bob is at the start, in words; below the axle within 4 deg, where pictures do not show the side."""
         angle, _ = self.pendulum.swing(self.peak_angle, self.phase / 360.0)
         below = abs(angle) < math.radians(4.0)
         return "below the axle" if below else spoken(self.plane + (0.0 if angle > 0.0 else 180.0))

@@ -131,7 +131,7 @@ class SlideCatch(Scenario):
         return Strict("the bin tipped over") if world.tilt("bin") > math.radians(20.0) else None
 
     def turned(self, world: World) -> bool:
-        """Whether the ramp has begun to tilt, and the bin is not square to the lip."""
+        """Whether the ramp has started to tilt, and the bin is not square to the lip."""
         return world.time > self.start and abs(yaw_of(world.rot("bin"))) > MAX_BIN_TURN
 
     def caught(self, world: World, block: str, depth: float = 0.0) -> bool:

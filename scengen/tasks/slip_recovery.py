@@ -19,7 +19,7 @@ and "sliding the object is not allowed":
   happen on the spot gains nothing. The distance is hidden and has a wide range, and the object's narrow side is along
   the way: a hand that comes down blindly where objects fall on average comes down beside it or on it, and there is no
   time for a second attempt.
-* During the window the gripper is open whatever the command, and obeys afterwards. The window lasts longer than the
+* During the window the gripper ignores its command and is open; afterwards it obeys. The window lasts longer than the
   fall; scenarios with shorter ones are refuted.
 * A strict rule that the paper lacks: the episode is lost if the robot touches the object at the end of a slip, unless
   the object has lain on the table untouched in the meantime. A hand on its side, with one finger below the object,

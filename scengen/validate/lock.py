@@ -70,7 +70,7 @@ def lock_of_run(folder: Path, family: type[Scenario], made: Mapping[str, Any]) -
         made: entries of `labels.made_with` of the run.
 
     Raises:
-        PoolError: the run is continued with other packages than it was begun with.
+        PoolError: the run is continued with other packages than it was started with.
         BadConfig: the file cannot be written.
     """
     begun, here = read_lock(folder), needed(family, made["versions"])

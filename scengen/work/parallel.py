@@ -145,7 +145,7 @@ def made_of_lost(item: A, reason: str, lost: Callable[[A, str], B] | None) -> B:
 
 
 _END: Any = object()
-"""Sentinel that is no item."""
+"""Sentinel that is not an item."""
 
 
 @dataclass(frozen=True)

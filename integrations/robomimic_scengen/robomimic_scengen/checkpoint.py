@@ -33,7 +33,7 @@ class Checkpoint:
             BadConfig: there is no such file, or the policy reads what the environment does not give.
         """
         if not file.is_file():
-            raise BadConfig(f"{VARIABLE} = {file} is no file; it names a checkpoint of robomimic, models/*.pth")
+            raise BadConfig(f"{VARIABLE} = {file} is not a file; it names a checkpoint of robomimic, models/*.pth")
         device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         self._policy, stored = policy_from_checkpoint(device=device, ckpt_path=str(file))
         own, given = names(env.task.embodiment), env.observation_space.spaces

@@ -63,13 +63,13 @@ def command(arguments: Arguments) -> int:
 
 
 def _leaks(task: Task, settings: AttackSettings) -> Leaks:
-    """Search observations for hidden parameters, and print what they tell."""
+    """Search observations for hidden parameters, and print those that are revealed."""
     with ProgressBar(err, f"observe {task.name}", LEAK_DRAWS, settings.workers) as progress_bar:
         found = leaks(task, settings.split, LEAK_DRAWS, settings.seed, settings.workers, progress_bar.show)
     what = f"{len(found.hidden)} hidden parameters in {found.draws} draws of {found.split}"
-    say(f"{what}: observations tell {len(found.found)}")
+    say(f"{what}: observations reveal {len(found.found)}")
     for leak in found.found:
-        warn(f"LEAK {leak.stream} tells {leak.parameter}: explained variance {leak.explained:.2f} on held-out draws")
+        warn(f"LEAK {leak.stream} reveals {leak.parameter}: explained variance {leak.explained:.2f} on held-out draws")
     return found
 
 

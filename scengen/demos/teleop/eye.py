@@ -90,7 +90,7 @@ class Eye:
                         with self._fresh:
                             self._fresh.wait(timeout=0.5)
                         time.sleep(max(0.0, begun + self._least - time.monotonic()))
-        except BaseException as error:  # whoever looks is told
+        except BaseException as error:  # reported to the person at the page
             self._fault = error
             self._ready.set()
 

@@ -90,7 +90,7 @@ def _read(path: str) -> Data:
 
     Raises:
         BadConfig: it has nothing that a policy could see.
-        PoolError: it is no recording of scengen in robomimic's format.
+        PoolError: it is not a recording of scengen in robomimic's format.
     """
     check_target(path, "data")
     import h5py
@@ -113,7 +113,7 @@ def _read(path: str) -> Data:
     poses = ("eef_pos", f"eef_quat{keys.SITE}", "gripper_qpos")
     low = tuple(key for key in names if key.endswith(poses) or (key == keys.OBJECT and not pictures))
     if not pictures and keys.OBJECT not in low:
-        raise BadConfig(f"{path} has neither pictures nor {keys.OBJECT}; a policy needs one of them, so record it anew")
+        raise BadConfig(f"{path} has neither pictures nor {keys.OBJECT}; a policy needs one: record it again")
     return Data(low, pictures, (width, height), names)
 
 
