@@ -26,7 +26,7 @@ def check_rules(name: str) -> Rules:
     """The rules of a name.
 
     Raises:
-        UnknownName: there are none.
+        UnknownName: they do not exist.
     """
     if name not in RULES:
         raise UnknownName("rules", str(name), RULES)

@@ -57,7 +57,7 @@ class NoEvent(ScengenError):
 
 
 class NoOracle(ScengenError):
-    """A family without a scripted solution was asked for one."""
+    """The requested oracle does not exist: the family has no scripted solution."""
 
     def __init__(self, family: str):
         super().__init__(f"{family} has no oracle; write its method oracle(world), see CONTRIBUTING.md")

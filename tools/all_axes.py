@@ -29,7 +29,7 @@ from scengen.validate.certify import lower_bound
 CERTIFIED = ("certified", "oracle", "robosuite")
 """Titles of the figures of certification."""
 BASELINES = (*MOTION, *OBJECT_CENTRIC, *BELIEF)
-"""Baselines that have a column of their own."""
+"""Baselines that have a separate column."""
 TITLES = [name.replace("object_centric", "object-centric").replace("_", " ") for name in BASELINES]
 """Titles of their columns."""
 COLUMNS = (

@@ -22,7 +22,7 @@ def store_card(task: Task, axis: str, n: int) -> None:
     """Write the row of a card.
 
     Args:
-        n: number of twins that were asked for.
+        n: number of twins that were requested.
 
     Raises:
         ScengenError: there is no card, or one of an earlier format.

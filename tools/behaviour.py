@@ -6,9 +6,9 @@
 
 `write` stores the behaviour of a new task, or of a task whose VERSION has risen. If the version is the stored one,
 only bits may differ; if verdicts, draws, scenes or rules differ, nothing is written, and VERSION has to rise. `check`
-plays all stored rollouts of all splits, kept cheats included; with `changed` only of tasks whose code has another hash
-than at the last check, which it then updates. `against` plays N fresh training draws, whose seed is the commit, here
-and in a work tree of that commit, and compares verdicts and bits.
+plays all stored rollouts of all splits, kept cheats included; with `changed` only of tasks whose code has a different
+hash than at the last check, which it then updates. `against` plays N fresh training draws, whose seed is the commit,
+here and in a work tree of that commit, and compares verdicts and bits.
 """
 
 import json

@@ -1,6 +1,6 @@
 """The packages in integrations/ with the real harnesses: `python tools/check_integrations.py [NAME ...]`.
 
-Each gets an environment of its own below build/integrations, from the package index, and its `check.py` plays the
+Each gets a separate environment below build/integrations, from the package index, and its `check.py` plays the
 policy `replay` on a pool in distribution and on one out of it. The verdicts of all scenarios must be those of `scengen
 evaluate`; that of robomimic compares the actions of a checkpoint. A package whose Python is missing is told as not
 tried. Exit status 1 if one fails.
@@ -43,7 +43,7 @@ def pools(home: Path) -> list[str]:
 
 
 def checked(name: str, interpreter: str) -> bool:
-    """Whether the check of a package passes in an environment of its own."""
+    """Whether the check of a package passes in a separate environment."""
     home, here = FOLDER / name, ROOT / "integrations" / name
     python = home / "bin" / "python"
     if not python.exists():

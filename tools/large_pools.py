@@ -1,4 +1,4 @@
-"""Measure the cost of large pools: each command that reads pools, in a process of its own, as a table.
+"""Measure the cost of large pools: each command that reads pools, in a separate process, as a table.
 
     python tools/large_pools.py POOL [POOL ...]
 

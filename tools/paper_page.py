@@ -1,6 +1,6 @@
 """Decisions of each task where the paper is silent, and its differences, for docs/paper.md.
 
-The text is taken from the docstrings of the families: everything after the paragraph that begins with "Bottleneck".
+The text is taken from the docstrings of the families: everything after the paragraph that starts with "Bottleneck".
 """
 
 import ast
@@ -100,5 +100,5 @@ def decisions(task: Task) -> str:
     text = ast.get_docstring(ast.parse(Path(inspect.getfile(task.family)).read_text())) or ""
     found = re.search(r"^Bottleneck.*?\n\n", text, re.M | re.S)
     if found is None or not text[found.end() :].strip():
-        sys.exit(f"{task.name}: its docstring has no decisions after a paragraph that begins with Bottleneck")
+        sys.exit(f"{task.name}: its docstring has no decisions after a paragraph that starts with Bottleneck")
     return text[found.end() :].strip()

@@ -209,7 +209,7 @@ def prepare(task: Task, name: str) -> None:
 
 
 def derive(question: Question, task: Task) -> None:
-    """Make the spoiled, the curated and the random recording of a task, if they are asked for and missing."""
+    """Make the spoiled, the curated and the random recording of a task, if they are requested and missing."""
     if question == "curation":
         sets = _recordings(task)
         _make(sets[ALL], sets[MIXED], spoil)

@@ -99,7 +99,7 @@ class ScengenEmbodiment(EmbodimentBase):
         )
 
     def reset(self, scene: Scene, *, seed: int | None = None) -> Observation:
-        """Begin the scenario with the id of the scene. Scenarios are stored, so the seed has no effect."""
+        """Start the scenario with the id of the scene. Scenarios are stored, so the seed has no effect."""
         observation, _ = self.env.reset(options={"scenario": scene.id})
         return self._observed(observation)
 

@@ -179,7 +179,7 @@ class Policy:
         self.version = f"{Path(weights).stat().st_size} {Path(weights).stat().st_mtime_ns}"
 
     def reset(self, observation, info, seed) -> None:
-        """Begin an episode."""
+        """Start an episode."""
         self.before, self.queue = None, []
 
     def act(self, observation) -> np.ndarray:

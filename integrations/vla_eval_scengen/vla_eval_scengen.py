@@ -80,7 +80,7 @@ class ScengenBenchmark(StepBenchmark):
         return [{"name": f"{self.task_name}/{split}", "suite": split} for split in self.splits]
 
     def reset(self, task: Task) -> Any:
-        """Begin the scenario whose number in the split is that of the episode."""
+        """Start the scenario whose number in the split is that of the episode."""
         env, number = self._env(task["suite"]), task["episode_idx"]
         if number >= len(env.scenarios):
             raise BadConfig(

@@ -240,7 +240,7 @@ def hit(
     """The evidence of a success; None if the success is not the same, bit for bit, in a fresh world.
 
     Args:
-        node: state from which the attempt began; None for the start of the episode.
+        node: state from which the attempt started; None for the start of the episode.
         causal: contacts of the witness that a hit should have.
     """
     fresh = World.load(player.scene_xml, player.embodiment)

@@ -62,7 +62,7 @@ PUSH_CLEARANCE = 0.015
 GONE_DISTANCE = 0.06
 """Distance from the hand above which a body counts as gone [m]."""
 CATCH_DISTANCE = 0.05
-"""Distance from the hand at which the hand begins to close on a body that returns [m]. On an incline of 25 deg the body
+"""Distance from the hand at which the hand starts to close on a body that returns [m]. On an incline of 25 deg the body
 then turns round 0.15 s later, which is the time that the fingers need."""
 MAX_GRASP_DEPTH = PALM_ABOVE - 0.004
 """Maximum height of the top of a body above the grip site of a hand that grasps it [m]."""

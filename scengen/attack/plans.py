@@ -1,6 +1,6 @@
 """Feedback plans around a puzzle: pursue, press down, stand in the way, cradle, loosen, carry through narrow ways.
 
-People who attack a task by hand begin here (`docs/cheats.md`), and so does the tier `servo` of the adversary. The plans
+People who attack a task by hand start here (`docs/cheats.md`), and so does the tier `servo` of the adversary. The plans
 know bodies and arms, but no task. They read poses and velocities as a policy with a good camera would, and no parameter
 of the scenario.
 """

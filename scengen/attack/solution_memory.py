@@ -81,7 +81,7 @@ class HandPath:
                 yield np.clip(action, -1.0, 1.0)
 
     def _grip(self, row: int) -> float:
-        """The gripper command in force when a part begins."""
+        """The gripper command in force when a part starts."""
         return float(self.actions[row - 1][6]) if row else -1.0
 
 

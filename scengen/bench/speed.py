@@ -150,7 +150,7 @@ def _rollout(scenario: Scenario, world: World, horizon: float, periods: int) -> 
 def parts_of_a_rollout(repeats: int) -> dict[str, float]:
     """Processor time of a control period of an oracle rollout, part by part, over the bare mj_step calls: 1 and more.
 
-    Each side does what the one before does, and one thing more.
+    Each side does what the previous one does, and one thing more.
     """
     task = compose.load_task("domino_single")
     scenario = task.draw("id", 0, 0).scenario

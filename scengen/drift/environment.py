@@ -117,7 +117,7 @@ def versions_of(setting: str | list[str]) -> list[str]:
     """Versions in the setting `mujoco`, each once, in their order.
 
     Raises:
-        BadConfig: there is none.
+        BadConfig: it does not exist.
     """
     versions = [setting] if isinstance(setting, str) else list(dict.fromkeys(setting))
     if not versions:

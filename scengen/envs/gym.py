@@ -199,7 +199,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._row: PoolRow = self._rows[0]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles open the pools again and continue from the same state with a simulation of their own."""
+        """Copies and pickles open the pools again and continue from the same state with a separate simulation."""
         with self._lock:
             return _revived, (type(self), self._arguments, self._progress())
 
@@ -287,7 +287,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Advance one control period (10 ms), or `action_repeat` of them.
 
         Raises:
-            ValueError: the action has another shape than `action_space`, or is not finite. Nothing is simulated then.
+            ValueError: the action has a different shape than `action_space`, or is not finite. Nothing is simulated
+                then.
         """
         given = checked(action, action_size(self.task.embodiment))
         if self._world is None:

@@ -18,7 +18,7 @@ from ..installation import ROBOSUITE
 from ..robots import panda, suction
 from ..sim import scene_text
 
-REMEDY = "run pip install 'scengen[robosuite]', in an environment of its own"
+REMEDY = "run pip install 'scengen[robosuite]', in a separate environment"
 """Remedy for every fault that keeps robosuite's environments from running."""
 
 

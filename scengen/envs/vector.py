@@ -1,6 +1,6 @@
 """Many environments in one process: `gymnasium.make_vec("scengen/domino_single-v1", num_envs=16, pool="generated/id")`.
 
-Every slot has a simulation of its own. Threads step the slots: the compiled control loop releases Python's lock.
+Every slot has its own simulation. Threads step the slots: the compiled control loop releases Python's lock.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +22,7 @@ from .observations import Reading
 from .pools import Folders
 
 MODES = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP, AutoresetMode.DISABLED)
-"""Modes in which a slot begins its next episode: in the step after the end, at once, or when it is reset."""
+"""Modes in which a slot starts its next episode: in the step after the end, at once, or when it is reset."""
 MASK = "reset_mask"
 """Reset option that chooses slots, as in Gymnasium's own vector environments."""
 MAX_SLOTS = 4096
@@ -40,14 +40,14 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
     Observations, rewards and infos have the slots along their first axis and are new arrays in every step. They have
     the bits of single environments, with any number of threads.
 
-    Scenarios are handed out in the order of the pools: `reset(seed=s)` begins number s in the first slot, s + 1 in the
+    Scenarios are handed out in the order of the pools: `reset(seed=s)` starts number s in the first slot, s + 1 in the
     second, and so on. A slot whose episode ends gets the next one that no slot has had; among several slots the first
     comes first. After the last scenario the first one follows.
 
-    With `AutoresetMode.NEXT_STEP` the step after the end of an episode ignores the slot's action and begins the next
+    With `AutoresetMode.NEXT_STEP` the step after the end of an episode ignores the slot's action and starts the next
     one. With `AutoresetMode.SAME_STEP` the step that ends an episode returns the first observation of the next one;
     `infos["final_obs"]` and `infos["final_info"]` hold the end of the old one. With `AutoresetMode.DISABLED` a slot
-    stays at the end of its episode, and its actions are ignored, until `reset(options={"reset_mask": mask})` begins
+    stays at the end of its episode, and its actions are ignored, until `reset(options={"reset_mask": mask})` starts
     another one.
     """
 
@@ -108,7 +108,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Reading], dict[str, Any]]:
-        """Begin an episode in every slot.
+        """Start an episode in every slot.
 
         Args:
             seed: number of the first slot's scenario, or the numbers for all slots; None for those that come next.
@@ -202,7 +202,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
     # --- scenarios ------------------------------------------------------------------------
 
     def _mask(self, given: Any) -> NDArray[np.bool_]:
-        """The slots that a reset begins, shape (num_envs,)."""
+        """The slots that a reset starts, shape (num_envs,)."""
         if given is None:
             return np.ones(self.num_envs, np.bool_)
         mask = np.asarray(given)
@@ -242,7 +242,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         return {slot: self._rows[self._following()] for slot in np.flatnonzero(over).tolist()}
 
     def _begin(self, rows: Mapping[int, PoolRow]) -> dict[int, dict[str, Any]]:
-        """Begin episodes in some slots, and return their infos."""
+        """Start episodes in some slots, and return their infos."""
         infos: dict[int, dict[str, Any]] = {}
 
         def load(slots: Sequence[int]) -> None:

@@ -134,7 +134,7 @@ def _scenarios(
         about |= _first_scenarios(pool, settings, search)
     if not about:
         named = ", ".join(sorted({split for pool in pools for split in pool.kinds("split")[0]}))
-        raise BadConfig(f"splits = {settings.splits}; these pools have none of them, but {named}; say splits=all")
+        raise BadConfig(f"splits = {settings.splits}; these pools have none of them, but {named}; pass splits=all")
     rows = (
         row
         for pool in pools
@@ -164,7 +164,7 @@ def _first_scenarios(pool: Pool, settings: EvaluateSettings, search: Sequence[st
     every = [(id_, {**told, "task_version": versions[told["task"]]}) for id_, told in every]
     wanted = [(id_, told) for id_, told in every if _is_wanted(told["task"], told["split"], settings.splits, search)]
     if wanted and len(wanted) < settings.seeds:
-        remedy = f"say seeds={len(wanted)}"
+        remedy = f"pass seeds={len(wanted)}"
         raise BadConfig(f"seeds = {settings.seeds}, but {pool.folder} holds {len(wanted)} scenarios; {remedy}")
     return {(str(pool.folder), id_): told for id_, told in wanted[: settings.seeds]}
 

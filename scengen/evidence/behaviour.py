@@ -88,7 +88,7 @@ class Behaviour:
         """The behaviour in a file.
 
         Raises:
-            PoolError: there is none, it is damaged, or it has another format.
+            PoolError: it does not exist, it is damaged, or it has another format.
         """
         if not path.is_file():
             raise PoolError(f"no stored behaviour at {path}; write it with python tools/behaviour.py write {path.stem}")
@@ -98,7 +98,7 @@ class Behaviour:
                 return cls(**plain)
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise PoolError(f"{path} is damaged ({' '.join(str(error).split())[:160]}); restore it") from None
-        raise PoolError(f"{path} has another format than {FORMAT}; install the scengen that wrote it, or restore it")
+        raise PoolError(f"{path} is not of format {FORMAT}; install the scengen that wrote it, or restore it")
 
     def write(self, path: Path) -> None:
         """Write the file: one line for each draw, limit, state and rollout."""
@@ -168,7 +168,7 @@ def _questions(task: str) -> str:
 
 
 QUANTILES = (1e-9, 0.25, 0.5, 0.75, 1.0 - 1e-9)
-"""Numbers at which a distribution is asked for its values, so that its class may be written in another way."""
+"""Numbers in [0, 1] at which the quantiles of a distribution are compared, so that its class may be rewritten."""
 
 
 def quantiles(dist: Dist) -> list[float]:

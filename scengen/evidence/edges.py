@@ -14,7 +14,7 @@ from ..samplers.task import Task
 from ..scenario import Scenario
 
 GRID = 12
-"""Number of steps of a way between two parameter values, in each of which a constraint may begin to fail."""
+"""Number of steps of a way between two parameter values, in each of which a constraint may start to fail."""
 MAX_IN_STEP = 3
 """Largest number of limits that are looked for in one step."""
 BISECTIONS = 34

@@ -77,7 +77,7 @@ class Trace:
     on_change: OnChange | None = None
     """Called with the world and the new answer, and with the state and the answer of the period before."""
     before: NDArray[np.float64] | None = None
-    """State after the last period, if changes are asked for."""
+    """State after the last period, if changes are requested."""
 
     def __call__(self, world: World) -> None:
         answer = answer_of(self.scenario, world)

@@ -40,7 +40,7 @@ class Polygons:
         return cls(np.concatenate(parts) if parts else np.zeros(0, np.int64), sizes)
 
     def joined(self, names: Indices) -> Self:
-        """The polygons with other indices of vertices, without corners that repeat the one before.
+        """The polygons with other indices of vertices, without corners that repeat the previous one.
 
         Args:
             names: new index of each vertex.

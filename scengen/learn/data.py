@@ -126,13 +126,13 @@ def _task(recording: Recording, wanted: str | None) -> str:
     """The task whose demonstrations are read.
 
     Raises:
-        ScengenError: the recording has none of it, or has several tasks and none is asked for.
+        ScengenError: the recording lacks the task, or has several tasks and none is requested.
     """
     tasks = sorted({str(row["scengen/task"]) for row in recording.episodes})
     if wanted is not None and wanted not in tasks:
         raise UnknownName(f"task in {recording.folder}", wanted, tasks)
     if wanted is None and len(tasks) > 1:
-        raise BadConfig(f"{recording.folder} holds demonstrations of {' and '.join(tasks)}; say task=...")
+        raise BadConfig(f"{recording.folder} holds demonstrations of {' and '.join(tasks)}; pass task=...")
     return wanted or tasks[0]
 
 
@@ -164,7 +164,7 @@ def _columns(recording: Recording, streams: Sequence[str]) -> dict[str, tuple[st
         if stream not in known:
             if stream == NAME:
                 raise BadConfig(
-                    f"{recording.folder} holds no {NAME}: record with environment_state=true, or say observations=[...]"
+                    f"{recording.folder} holds no {NAME}: record with environment_state=true, or set observations=[...]"
                 )
             raise UnknownName("recorded stream", stream, known)
         column, feature = known[stream]

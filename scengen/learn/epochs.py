@@ -133,7 +133,7 @@ class Training:
         }
         network = MLPRegressor(**options)
         with threadpool_limits(1), warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)  # one pass is what was asked for
+            warnings.simplefilter("ignore", ConvergenceWarning)  # one pass is what was requested
             if self.arrays:
                 network.partial_fit(inputs[:BATCH], chunks[:BATCH])  # makes the arrays that are replaced now
                 network.coefs_ = [self.arrays[f"weights{i}"][member].copy() for i in range(len(self.hidden) + 1)]

@@ -169,7 +169,7 @@ class StoredPolicy:
         """Read a policy.
 
         Raises:
-            PoolError: there is none, it is damaged, or of another format.
+            PoolError: it does not exist, it is damaged, or of another format.
         """
         settings = read_settings(folder)
         path = Path(folder, WEIGHTS)
@@ -206,7 +206,7 @@ def read_settings(folder: str | Path) -> PolicySettings:
     """The settings of the policy in a folder.
 
     Raises:
-        PoolError: there is none, it is damaged, or of another format.
+        PoolError: it does not exist, it is damaged, or of another format.
     """
     path = Path(folder, SETTINGS)
     if not path.is_file():

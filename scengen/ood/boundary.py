@@ -2,7 +2,7 @@
 
 A point on the path of an axis is a fraction: 0 is the edge of training, 1 the axis' far end. Beyond 1 the path goes on
 to the bounds of the parameters, or to where it would come nearer to training again. Twin i is scenario i of training
-with the axis' parameters put at that point. Every trial has a twin of its own.
+with the axis' parameters put at that point. Every trial has its own twin.
 
 The boundary is the first point at which half of the twins or fewer are solved. The first looks are fixed: at both ends
 and at places along the whole path, so that a hole of a tenth of the axis is seen. The other looks go to where the

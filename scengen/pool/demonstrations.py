@@ -82,7 +82,7 @@ class DemonstrationManifest:
 
     config: DemonstrationConfig
     n: int
-    """Number of demonstrations that were asked for."""
+    """Number of demonstrations that were requested."""
     indices: int
     """Number of attempts: of indices, times the runs of each. Runs that a person did not need are counted, too."""
     funnel: Mapping[str, int]
@@ -115,7 +115,7 @@ class DemonstrationManifest:
         """The manifest of a folder.
 
         Raises:
-            PoolError: there is none, it is damaged, or it is of another format.
+            PoolError: it does not exist, it is damaged, or it is of another format.
         """
         path = folder / DEMONSTRATIONS
         if not path.is_file():
@@ -169,7 +169,7 @@ def _check(manifest: DemonstrationManifest) -> None:
     demand(0 < len(config.styles) <= 100, f"config.styles has {len(config.styles)} entries")
     for style in config.styles:
         check_match("config.styles", style, WORD)
-    demand(config.keep in ((), ("failed",)), "config.keep names something else than failed")
+    demand(config.keep in ((), ("failed",)), "config.keep names something other than failed")
     demand(len(config.apart) <= MAX_SHARDS, f"config.apart has {len(config.apart)} entries")
     for pool in config.apart:
         check_match("config.apart", pool, HASH)
@@ -188,7 +188,7 @@ def _check(manifest: DemonstrationManifest) -> None:
         demand((stated is None) == (source not in config.styles), f"style {source} and its source go together")
         demand(source not in config.styles or len(config.styles) == 1, f"{source} stands beside other styles")
     if manifest.failed is not None:
-        demand(manifest.failed.file == FAILED, f"failed names another file than {FAILED}")
+        demand(manifest.failed.file == FAILED, f"failed names a different file than {FAILED}")
     check_text("config.split", config.split, MAX_TEXT)
 
 

@@ -72,7 +72,7 @@ class Manifest:
 
     config: RunConfig
     n: int
-    """Number of scenarios that were asked for."""
+    """Number of scenarios that were requested."""
     indices: int
     """Number of indices that were tried."""
     first_draws: int
@@ -115,7 +115,7 @@ class Manifest:
         """The manifest of a folder.
 
         Raises:
-            PoolError: there is none, it is damaged, or it is of another format.
+            PoolError: it does not exist, it is damaged, or it is of another format.
         """
         path = folder / MANIFEST
         if not path.is_file():
@@ -206,7 +206,7 @@ def _check(manifest: Manifest) -> None:
         check_entry(entry)
     demand(len({entry.file for entry in manifest.shards}) == len(manifest.shards), "a shard is listed twice")
     if manifest.rejected is not None:
-        demand(manifest.rejected.file == REJECTED, f"rejected names another file than {REJECTED}")
+        demand(manifest.rejected.file == REJECTED, f"rejected names a different file than {REJECTED}")
     if manifest.attack is not None:
         _check_attack(manifest.attack)
     if manifest.subset is not None:
@@ -237,7 +237,7 @@ def _check_config(config: RunConfig) -> None:
     check_text("config.certify.name", config.certify.get("name"), 100)
     check_settling(config.certify.get("settle"))
     for verdict in config.keep:
-        demand(verdict in ("refuted", "unknown"), "config.keep names another verdict than refuted and unknown")
+        demand(verdict in ("refuted", "unknown"), "config.keep names a different verdict than refuted and unknown")
 
 
 def check_draws(task: Mapping[str, Any], split: str, sampler: str, seed: int) -> None:

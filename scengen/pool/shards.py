@@ -55,7 +55,7 @@ def read_rows(shard: Shard, names: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Some columns of all rows, one by one, as the values of `PoolRow`'s fields.
 
     Raises:
-        PoolError: the file cannot be read, holds something else than a pool of this format, or another number of rows.
+        PoolError: the file cannot be read, holds something other than a pool of this format, or another number of rows.
     """
     count = 0
     with _reported_faults(shard, lambda: f"from row {count} on"), opened(shard) as file:

@@ -50,7 +50,7 @@ def place() -> Place:
     """The place from which this process reads the robot's files.
 
     Raises:
-        NoRobot: there is none, or the environment variable names no folder.
+        NoRobot: it does not exist, or the environment variable names no folder.
     """
     found = _named() or _installed() or _cached()
     if found is None:

@@ -67,7 +67,7 @@ class Summary:
     first_draws: int
     """Number of indices whose first draw was certified."""
     attack: attacks.AttackReport | None
-    """Report of the adversary, if an attack was asked for."""
+    """Report of the adversary, if an attack was requested."""
     cpu: float
     """Processor time of all counted indices, in this run or earlier ones [s]."""
 

@@ -62,7 +62,7 @@ class Journal:
         kind: type[SceneRow] = PoolRow,
         setting: str = "pool",
     ):
-        """Begin or continue the run that makes `pool`.
+        """Start or continue the run that makes `pool`.
 
         Args:
             identity: all settings that the scenarios depend on.
@@ -75,7 +75,7 @@ class Journal:
                 started.
         """
         if not pool.name or pool.name == "..":
-            raise PoolError(f"{pool} cannot become a pool; name a folder of its own with {setting}=")
+            raise PoolError(f"{pool} cannot become a pool; name a separate folder with {setting}=")
         try_folder(pool)
         self.folder, self._kind, self._setting = pool.with_name(pool.name + ".run"), kind, setting
         self._path = self.folder / "journal.sqlite"
@@ -188,7 +188,7 @@ class Journal:
 
 
 _KEPT = "finished work is kept, repeat the command to continue"
-_DAMAGED = "is damaged; move its folder aside (do not delete it) and repeat the command to begin again"
+_DAMAGED = "is damaged; move its folder aside (do not delete it) and repeat the command to start again"
 _READ_ONLY = f"is read-only; make it and its folder writable, {_KEPT}"
 _IN_USE = f"is in use by another program; wait for it, {_KEPT}"
 _FAULT = {

@@ -90,7 +90,7 @@ class World:
         return world
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles get a simulation of their own in the same state: addresses are looked up again."""
+        """Copies and pickles get a separate simulation in the same state: addresses are looked up again."""
         return _revived, (type(self), self.model, self.scripted, self.state())
 
     def reset(self) -> None:
@@ -191,7 +191,7 @@ class World:
         self.data.mocap_quat[mocap[self.body(body)]] = turn
 
     def passes(self, moment: float) -> bool:
-        """Whether `moment` [s] falls into the control period that begins now, to the nearest period."""
+        """Whether `moment` [s] falls into the control period that starts now, to the nearest period."""
         return abs(self.time - moment) < Loop.PERIOD / 2
 
     def launch(self, body: str, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
@@ -296,7 +296,7 @@ class World:
     def touching(self, a: str, b: str) -> bool:
         """Whether two bodies were in contact at any physics step of the last control period.
 
-        `ROBOT` and the `label` of an arm are accepted in the place of a body.
+        `ROBOT` and the `label` of an arm are accepted in place of a body.
         """
         return bool(self.loop.touching[self.row(a), self.row(b)])
 

@@ -4,7 +4,7 @@
      |   |   |   |       #            red           lane 4   gap: a tile stands beside the chain
                  |       #
      |   |   |   |   |   #                          lane 3   intact
-     | |  |    |         #                          lane 2   drift: each space is wider than the one before
+     | |  |    |         #                          lane 2   drift: each space is wider than the previous one
      |   |       |   |   #                          lane 1   (not in training) a tile is missing
      |   |   |   |   |   @            blue          lane 0   decoy: intact, but leads to the wrong slab
 

@@ -244,11 +244,11 @@ class LaunchedBall(Scenario):
 
 def way_at(ways: Sequence[Way], seconds: float) -> tuple[int, Way]:
     """Index of the way on which the ball is after a time [s], and the way."""
-    k = max(k for k, way in enumerate(ways) if way.begins <= seconds)
+    k = max(k for k, way in enumerate(ways) if way.starts <= seconds)
     return k, ways[k]
 
 
 def place_on(ways: Sequence[Way], seconds: float) -> Vec3:
     """Place of the ball after a time [m]."""
     _, way = way_at(ways, seconds)
-    return way.at + (seconds - way.begins) * way.velocity
+    return way.at + (seconds - way.starts) * way.velocity

@@ -353,7 +353,7 @@ class OccluderPush(Scenario):
         return next(apart, None)
 
     def push_start(self, i: int) -> Vec3:
-        """Place on the table where the push begins [m]."""
+        """Place on the table where the push starts [m]."""
         return self.foot(i) - (self.lid.width / 2 + APPROACH_DISTANCE) * self.directions[i]
 
     def swept(self, i: int, along: Vec3) -> Outline | None:

@@ -140,7 +140,7 @@ class Packing(Scenario):
         return Strict("a piece was tried in a second place") if moved else None
 
     def _elsewhere(self, world: World, i: int) -> bool:
-        """Whether piece `i` is in another place than at its first touch in the bin."""
+        """Whether piece `i` is in a different place than at its first touch in the bin."""
         shift, turn = off_first_pose(world, f"piece_{i}", i)
         return shift > self.unit or turn > MAX_TURN
 

@@ -150,7 +150,7 @@ class ShapeStack(Scenario):
         yield from self.pile(world, [*flat, cone])
 
     def pile(self, world: World, order: Sequence[str], offset: float = 0.0) -> Plan:
-        """Put each shape on the one before it, with its middle offset from the other's towards the robot [m]."""
+        """Put each shape on the previous one it, with its middle offset from the other's towards the robot [m]."""
         for below, name in pairwise(order):
             yield from self.take(world, name)
             at = self.place_on(world, name, below) - [offset, 0.0, 0.0]

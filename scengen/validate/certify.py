@@ -130,7 +130,7 @@ class Trial:
         return Check(name, None if waived else not reason, reason, settings, numbers)
 
     # Each check returns its settings, its numbers, and the reason of its failure: empty if it passed, and one that
-    # begins with `NOT_CHECKED` if there is nothing to check.
+    # starts with `NOT_CHECKED` if there is nothing to check.
 
     def _feasible(self) -> "Finding":
         """Constraints of the family. Numbers of a feasible scenario are the features that its physics depends on."""

@@ -107,7 +107,7 @@ def read_lock(folder: Path) -> dict[str, str] | None:
 
 
 def differing(locked: Mapping[str, str], here: Mapping[str, str]) -> dict[str, str]:
-    """Packages that a file names in another version than `here` has, with the version that the file names."""
+    """Packages that a file names in a different version than `here` has, with the version that the file names."""
     return {name: version for name, version in locked.items() if here.get(name, version) != version}
 
 

@@ -148,7 +148,7 @@ class _Bounding:
 
     def leave(self) -> None:
         with self._lock:
-            if self._inside:  # a process that began within a statement has left it already
+            if self._inside:  # a process that started within a statement has left it already
                 self._inside -= 1
                 if not self._inside:
                     resource.setrlimit(resource.RLIMIT_AS, self._before)

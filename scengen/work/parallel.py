@@ -117,7 +117,7 @@ def each(
 
 
 def apart(function: Callable[[A], B], item: A, limits: Limits, what: str) -> B:
-    """Apply a function to one item, in a process of its own that is ended at a limit.
+    """Apply a function to one item, in a separate process that is ended at a limit.
 
     Args:
         what: description of the work, for the error: `filming 8ed4a4577fe0`.

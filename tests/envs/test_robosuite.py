@@ -423,7 +423,7 @@ def test_a_demonstration_finds_its_scenario_again():
         ({"robots": "Sawyer"}, BadConfig, "certified with Panda"),
         ({"gripper_types": "RethinkGripper"}, BadConfig, "certified with PandaGripper"),
         ({"scenario": None}, BadConfig, "no scenario was given"),
-        ({"scenario": "nothing begins so", "pool": REFERENCE}, UnknownName, "no scenario in"),
+        ({"scenario": "nothing starts so", "pool": REFERENCE}, UnknownName, "no scenario in"),
         ({"scenario": None, "pool": REFERENCE / "not"}, PoolError, "no pool at"),
     ],
 )

@@ -47,7 +47,7 @@ class Checkpoint:
         self.identity = hashlib.sha256(file.read_bytes()).hexdigest()
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin an episode; the policy draws from torch's generator, which is seeded."""
+        """Start an episode; the policy draws from torch's generator, which is seeded."""
         torch.manual_seed(seed)
         self._policy.start_episode()
 

@@ -66,7 +66,7 @@ def _edition_pools(settings: EvaluateSettings, edition: str) -> list[str]:
 
 
 def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None], search: Sequence[str]) -> Evaluation:
-    """Evaluate one policy, and keep its rollouts if that is asked for."""
+    """Evaluate one policy, and keep its rollouts if that is requested."""
     if not settings.keep:
         return evaluate(settings, progress, search)
     tasks = {pool.task: load_task(pool.task, search) for pool in map(Pool.open, settings.folders)}

@@ -83,7 +83,7 @@ class TrySettings:
 
     @property
     def run(self) -> int | None:
-        """Number of the jittered run that is asked for; None if none is."""
+        """Number of the requested jittered run; None if no jittered run is requested."""
         word, colon, number = self.what.partition(":")
         if word != JITTER:
             return None

@@ -14,7 +14,7 @@ from .findings import Finding
 BLUR = 0.3
 """Mean Sobel gradient below which a picture is blurred [grey levels] (paper, App. C)."""
 SCENE_CHANGE = 10.0
-"""Median absolute deviation of a picture from the one before, above which the scene has changed [grey levels] (paper,
+"""Median absolute deviation of a picture from the previous one, above which the scene has changed [grey levels] (paper,
 App. C: MAD score)."""
 FROZEN = 0.5
 """Mean difference of two pictures below which they are the same [grey levels] (lerobot-lint)."""
@@ -106,7 +106,7 @@ def compared(camera: str, differences: Sequence[NDArray[np.float64]]) -> Iterato
     least = float(np.median([each.min() for each in differences]))
     if least > MISMATCH:
         told = {"difference": least, "limit": MISMATCH}
-        yield found("VIDEO_MISMATCH", f"{camera} shows something else than the replay", **told)
+        yield found("VIDEO_MISMATCH", f"{camera} shows something other than the replay", **told)
         return
     moved = [int(each.argmin()) - NEAR for each in differences if each.min() < CLEARLY * each[NEAR]]
     if 2 * len(moved) > len(differences):
@@ -142,7 +142,7 @@ def check_video(
         before, count = grey, number + 1
     if count != rows:
         yield found(
-            "FRAME_COUNT", f"{camera} has another number of pictures than there are rows", frames=count, rows=rows
+            "FRAME_COUNT", f"{camera} has a different number of pictures than there are rows", frames=count, rows=rows
         )
     told = {"BLUR": blurred, "SCENE_CHANGE": changed, "BLACK": dark, "WHITE": bright}
     words = {"BLUR": "is blurred", "SCENE_CHANGE": "changes at once", "BLACK": "is black", "WHITE": "is white"}

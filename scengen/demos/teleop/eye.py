@@ -1,4 +1,4 @@
-"""Pictures of a take that is driven, drawn in a thread of their own, so that the control loop does not wait."""
+"""Pictures of a take that is driven, drawn in a separate thread, so that the control loop does not wait."""
 
 import threading
 import time

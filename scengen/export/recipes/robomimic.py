@@ -66,7 +66,7 @@ def scripts(settings: RecipeSettings) -> Scripts:
         raise BadConfig(f"device = {cut(repr(settings.device))}; {told}")
     data = _read(settings.data)
     requirements = Path(settings.to, "requirements.txt")
-    install = f"in an environment of its own: pip install -r {requirements} (robomimic {ROBOMIMIC})"
+    install = f"in a separate environment: pip install -r {requirements} (robomimic {ROBOMIMIC})"
     origin = f"{NAME}, robomimic {ROBOMIMIC}. {ORIGIN}"
     smoke = {"experiment": {"epoch_every_n_steps": SMOKE_BATCHES, "save": {"every_n_epochs": 1}}}
     smoke |= {"train": {"batch_size": 2, "num_epochs": 1, "num_data_workers": 0, "cuda": False}}
@@ -211,7 +211,7 @@ def _text(config: Mapping[str, Any]) -> str:
 
 def _requirements() -> str:
     return (
-        f"# {NAME}: Python 3.11 or newer, in an environment of its own. cmake builds its requirement egl_probe.\n"
+        f"# {NAME}: Python 3.11 or newer, in a separate environment. cmake builds its requirement egl_probe.\n"
         f"robomimic=={ROBOMIMIC}\nscengen\n"
         f"# To play checkpoints, the robot's files: {INSTALL}\n"
         "# and, from a checkout of scengen: pip install integrations/robomimic_scengen\n"
