@@ -16,9 +16,9 @@ print(f"scenarios {', '.join(infos['scenario'][:6])} and so on")
 print(f"object-state {observations['object-state'].shape}, actions {envs.action_space.shape}")
 
 envs.action_space.seed(0)
-began = time.perf_counter()
+started = time.perf_counter()
 for _ in range(STEPS):
     observations, rewards, terminated, truncated, infos = envs.step(envs.action_space.sample())
-seconds = time.perf_counter() - began
+seconds = time.perf_counter() - started
 print(f"{STEPS * envs.num_envs / seconds:.0f} control periods of 10 ms per second; bodies: see envs.metadata['names']")
 envs.close()

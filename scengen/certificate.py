@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 Verdict = Literal["certified", "refuted", "unknown"]
-"""Result of certification. As in SMT-LIB, `unknown` is no claim: the oracle failed, and no check shows that every other
-policy must fail."""
+"""Result of certification. As in SMT-LIB, `unknown` is not a claim: the oracle failed, and no check shows that every
+other policy must fail."""
 
 CHECKS: dict[str, Verdict] = {
     "feasible": "refuted",

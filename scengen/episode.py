@@ -26,7 +26,7 @@ def check_rules(name: str) -> Rules:
     """The rules of a name.
 
     Raises:
-        UnknownName: there are none.
+        UnknownName: they do not exist.
     """
     if name not in RULES:
         raise UnknownName("rules", str(name), RULES)
@@ -66,7 +66,7 @@ class Episode:
         """
         self.begin()
         try:
-            self.world.apply(action)
+            self.world.step_filtered(action)
         except Unstable as error:
             self.outcome, self.reason = "unstable", str(error)
             return self.outcome

@@ -24,8 +24,8 @@ class UnknownName(ScengenError):
 
     def __init__(self, kind: str, name: str, known: Iterable[str]):
         names = sorted(known)
-        close, told = nearest(name, names), ", ".join(names) or "(none)"
-        super().__init__(f"no {kind} named {cut(repr(name))}{close}; known: {told}")
+        close, listed = nearest(name, names), ", ".join(names) or "(none)"
+        super().__init__(f"no {kind} named {cut(repr(name))}{close}; known: {listed}")
 
 
 class Infeasible(ScengenError):
@@ -33,8 +33,8 @@ class Infeasible(ScengenError):
 
     def __init__(self, where: str, tries: int, reasons: Mapping[str, int]):
         self.tries, self.reasons = tries, dict(reasons)
-        told = "; ".join(f"{n}x {reason}" for reason, n in sorted(reasons.items(), key=lambda x: -x[1]))
-        super().__init__(f"{where}: none of {tries} draws was feasible ({told}); widen the distributions")
+        text = "; ".join(f"{n}x {reason}" for reason, n in sorted(reasons.items(), key=lambda x: -x[1]))
+        super().__init__(f"{where}: none of {tries} draws was feasible ({text}); widen the distributions")
 
 
 class NoRobot(ScengenError):
@@ -57,7 +57,7 @@ class NoEvent(ScengenError):
 
 
 class NoOracle(ScengenError):
-    """A family without a scripted solution was asked for one."""
+    """The requested oracle does not exist: the family has no scripted solution."""
 
     def __init__(self, family: str):
         super().__init__(f"{family} has no oracle; write its method oracle(world), see CONTRIBUTING.md")

@@ -20,7 +20,7 @@ def table(title: str, head: Sequence[str], rows: Iterable[Sequence[object]], tot
 
     Args:
         rows: rows of as many values as the head has; no more of them are read than are shown.
-        total: number of all rows, which the line below a longer table tells.
+        total: number of all rows, which is stated below a longer table.
     """
     shown = list(islice(rows, MAX_ROWS))
     lines = [f"<tr>{_cells('th', head)}</tr>", *(f"<tr>{_cells('td', row)}</tr>" for row in shown)]

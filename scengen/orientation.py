@@ -47,7 +47,7 @@ class Orientation:
         if self.turns % 2 and width != height:
             raise BadConfig(
                 f"pictures of {width} x {height} pixels; here they are seen turned by a quarter and must be square: "
-                f"say width={height}, or height={width}"
+                f"pass width={height}, or height={width}"
             )
 
     def pixels(self, width: int, height: int) -> NDArray[np.float64]:

@@ -143,7 +143,7 @@ def as_if_rolling(at: Vec3, velocity: Vec3, surface: Vec3, friction: float) -> t
 
 
 def slip_angle(friction: float) -> float:
-    """Slope at which a block begins to slide [rad]."""
+    """Slope at which a block starts to slide [rad]."""
     return math.atan(friction)
 
 

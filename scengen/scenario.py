@@ -170,7 +170,7 @@ class Scenario(abc.ABC):
         parameters.
 
         A family has no state. What events need to know about the episode so far is in `world.memory`, which only this
-        method may write. Only this method may call `arm.jam`, `arm.tell`, `world.move`, `world.launch` and
+        method may write. Only this method may call `arm.jam`, `arm.set_action`, `world.move`, `world.launch` and
         `world.spin`.
         """
 
@@ -203,7 +203,7 @@ class Scenario(abc.ABC):
 
         A move starts from the state that the steps before it left. For a sub-goal of a right plan it is the oracle's
         own part, for a wrong one a shortcut's. The move of a sub-goal that may be repeated does one round, and yields
-        nothing if nothing is left to do. The method is called anew for every rollout, so that moves may share what was
+        nothing if nothing is left to do. The method is called for every rollout, so that moves may share what was
         sensed. A family states moves of all sub-goals of its right plans but those that only look, or none.
         """
         return {}

@@ -7,7 +7,7 @@ import numpy as np
 from scengen.demos.teleop.pad import PadEvent
 
 SLOW = 0.05
-"""Distance from the target at which the stick begins to return to its rest [m]."""
+"""Distance from the target at which the stick starts to return to its rest [m]."""
 REST = 0.24
 """Dead zone of the sticks."""
 CREEP = 0.12

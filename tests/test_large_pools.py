@@ -1,4 +1,4 @@
-"""Pools of any size: what is asked for is read, and nothing else."""
+"""Pools of any size: what is requested is read, and nothing else."""
 
 import re
 import subprocess

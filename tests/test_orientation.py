@@ -88,7 +88,7 @@ def test_a_turned_camera_shows_a_step_on_the_table_as_an_upright_one_shows_the_s
 def test_only_a_quarter_turn_asks_for_square_pictures(one):
     one.check_size(64, 64)
     if one.turns % 2:
-        with pytest.raises(BadConfig, match="must be square: say width=48, or height=64"):
+        with pytest.raises(BadConfig, match="must be square: pass width=48, or height=64"):
             one.check_size(64, 48)
     else:
         one.check_size(64, 48)

@@ -108,10 +108,10 @@ def test_a_block_on_a_turning_slope_lets_go_at_the_angle_of_friction(friction, d
     place(scene, Block(width=0.035, height=0.020, mass=0.03, friction=friction), "block", [0.3, 0, TABLE_TOP])
     model = scene.compile()
     data = mujoco.MjData(model)
-    begins = slip_angle(friction) - math.radians(3.0)
+    starts = slip_angle(friction) - math.radians(3.0)
     start, moved = None, None
     for step in range(round(1.5 / STEP)):
-        angle = begins + rate * step * STEP
+        angle = starts + rate * step * STEP
         model.opt.gravity[:] = [-GRAVITY * math.sin(angle), 0.0, -GRAVITY * math.cos(angle)]
         mujoco.mj_step(model, data)
         start = data.qpos[0] if start is None else start

@@ -2,7 +2,7 @@
 
     python tools/check_readers.py
 
-Readers run in environments of their own below build/readers, which are made if they are missing. Every error, and every
+Readers run in separate environments below build/readers, which are made if they are missing. Every error, and every
 warning without a reason in tools/readers/reasons.toml, ends with status 1.
 """
 
@@ -207,7 +207,7 @@ def page(found: Sequence[Found], pythons: Mapping[str, Path]) -> str:
         "<!-- Written by `make readers` -->",
         "",
         f"`make readers` makes demonstrations of {len(TASKS)} tasks, {EPISODES} each, and records them with "
-        "`rates=native`, the first with a camera, and for robomimic. It opens them in environments of their own: "
+        "`rates=native`, the first with a camera, and for robomimic. It opens them in separate environments: "
         f"{'; '.join(versions)}.",
         "",
         "| recording | robot |",

@@ -99,7 +99,7 @@ class ScengenEmbodiment(EmbodimentBase):
         )
 
     def reset(self, scene: Scene, *, seed: int | None = None) -> Observation:
-        """Begin the scenario with the id of the scene. Scenarios are stored, so the seed has no effect."""
+        """Start the scenario with the id of the scene. Scenarios are stored, so the seed has no effect."""
         observation, _ = self.env.reset(options={"scenario": scene.id})
         return self._observed(observation)
 
@@ -131,7 +131,7 @@ class ScengenEmbodiment(EmbodimentBase):
 
 
 def scengen_task(pool: str, *, split: str = "id", n: int = 20) -> Task:
-    """The first `n` scenarios of a split as scenes. Their ids are hashes, which tell a policy nothing.
+    """The first `n` scenarios of a split as scenes. Their ids are hashes, which reveal nothing to a policy.
 
     Args:
         pool: folder of a pool, or several folders separated by commas, of one task.

@@ -27,7 +27,7 @@ class Replay(torch.nn.Module):
         self.policies, self.begun = [NearestReplay(env, memory) for env in envs], False
 
     def reset(self) -> None:
-        """Begin an episode. LeRobot calls it before the environments are reset."""
+        """Start an episode. LeRobot calls it before the environments are reset."""
         self.begun = False
 
     def select_action(self, batch: dict) -> torch.Tensor:

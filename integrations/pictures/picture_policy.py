@@ -114,7 +114,7 @@ class Network(nn.Module):
 
 
 def train(frames: str, weights: str, minutes: str = "5") -> None:
-    """Train on all stored demonstrations but every tenth, whose error is told, for some minutes."""
+    """Train for some minutes on nine tenths of the stored demonstrations, and report the error on the others."""
     torch.manual_seed(0)
     device = "cuda" if torch.cuda.is_available() else "cpu"
     pictures, pose, actions, rows, held_out = [], [], [], [], []
@@ -179,7 +179,7 @@ class Policy:
         self.version = f"{Path(weights).stat().st_size} {Path(weights).stat().st_mtime_ns}"
 
     def reset(self, observation, info, seed) -> None:
-        """Begin an episode."""
+        """Start an episode."""
         self.before, self.queue = None, []
 
     def act(self, observation) -> np.ndarray:

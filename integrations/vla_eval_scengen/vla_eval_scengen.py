@@ -80,7 +80,7 @@ class ScengenBenchmark(StepBenchmark):
         return [{"name": f"{self.task_name}/{split}", "suite": split} for split in self.splits]
 
     def reset(self, task: Task) -> Any:
-        """Begin the scenario whose number in the split is that of the episode."""
+        """Start the scenario whose number in the split is that of the episode."""
         env, number = self._env(task["suite"]), task["episode_idx"]
         if number >= len(env.scenarios):
             raise BadConfig(
@@ -117,7 +117,7 @@ class ScengenBenchmark(StepBenchmark):
         return {"max_steps": round(self.horizon / seconds) + 1, "settle": self.settings["settle"]}
 
     def get_hold_action(self, last_action: Action | None) -> Action:
-        """No displacement, and the gripper as it was last told."""
+        """No displacement, and the last gripper command."""
         held = np.zeros(action_size(self.embodiment), np.float32)
         if last_action is not None:
             held[6::7] = np.asarray(last_action["actions"], np.float32).reshape(-1, held.size)[-1][6::7]

@@ -178,7 +178,7 @@ class Trials:
     total: int
     """Number of free trials."""
     told: list[dict[str, Any]] = field(default_factory=list)
-    """What became of those that are over, see `Episode.told`."""
+    """Results of finished trials, see `Episode.told`."""
 
 
 def _start(env: PoolEnv, scenario: str) -> Observation:

@@ -54,14 +54,14 @@ class Calls:
         """Answer from the journal of another run as well.
 
         Raises:
-            BadConfig: the file cannot be read, or is no journal.
+            BadConfig: the file cannot be read, or is not a journal.
         """
         try:
             _, *lines = path.read_text().splitlines()
             found = [json.loads(line) for line in lines]
             self._recorded = {record["digest"]: record for record in found} | self._recorded
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise BadConfig(f"{path} is no journal of calls ({error}); name the {CALLS} of a run") from None
+            raise BadConfig(f"{path} is not a journal of calls ({error}); name the {CALLS} of a run") from None
 
     def ask(
         self,

@@ -27,7 +27,7 @@ DONE = "done"
 """End of a step whose move was carried out."""
 
 
-NOT_BEGUN = "not begun"
+NOT_BEGUN = "not started"
 """End of a step that the plan did not come to."""
 NO_PLAN = "there is no plan"
 """Reason of a reply without a step."""

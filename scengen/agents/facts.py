@@ -114,7 +114,7 @@ class Sheet:
     """Neutral names of things by body: what a person calls them who only sees the scene. `tile_*` stands for all
     bodies that begin with `tile_` and have no line of their own."""
     parts: list[str] = field(default_factory=list)
-    """Names of parts of things, such as a handle, that are no bodies."""
+    """Names of parts of things, such as a handle, that are not bodies."""
     facts: Mapping[str, Question] = field(default_factory=dict)
     """Questions by id."""
     order: Mapping[str, Subgoal] = field(default_factory=dict)

@@ -106,7 +106,7 @@ def _exists(name: str, told: str) -> bool:
 def _misplaced(names: Sequence[str], order: Order) -> list[tuple[str, str]]:
     """Pairs of sub-goals of a plan, of which the first one comes before the second one and must not.
 
-    The plan is gone through with the conditions that its steps give. A look that comes too early tells nothing; it is
+    The plan is gone through with the conditions that its steps give. A look that comes too early reveals nothing; it is
     an error only if the plan does not look again in time. What may be repeated may not follow what ends it.
     """
     givers = {c: name for name, subgoal in order.subgoals.items() if name in names for c in subgoal.gives}

@@ -124,9 +124,9 @@ class Endpoint:
         """Ask the endpoint; a busy one is asked again, at most `TRIES` times.
 
         Raises:
-            ModelError: it cannot be reached, refuses the request, or answers something else than a completion.
+            ModelError: it cannot be reached, refuses the request, or answers something other than a completion.
         """
-        began = time.monotonic()
+        started = time.monotonic()
         answer = self._post(self._body(turns, tools, schema, temperature, seed))
         try:
             message, usage = answer["choices"][0]["message"], answer.get("usage") or {}
@@ -135,7 +135,7 @@ class Endpoint:
                 for c in message.get("tool_calls") or ()
             )
             tokens = int(usage.get("prompt_tokens") or 0), int(usage.get("completion_tokens") or 0)
-            return Reply(str(message.get("content") or ""), calls, *tokens, time.monotonic() - began)
+            return Reply(str(message.get("content") or ""), calls, *tokens, time.monotonic() - started)
         except (KeyError, IndexError, TypeError, ValueError, AttributeError):
             raise ModelError(f"{self.url} answers no chat completion: {cut(json.dumps(answer))}") from None
 

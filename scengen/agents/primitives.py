@@ -37,7 +37,7 @@ DONE = "Done"
 
 
 class BadCall(ScengenError):
-    """A call of a tool that cannot be carried out; the model is told why."""
+    """A tool call that cannot be carried out; the reason goes to the model."""
 
 
 def tools(arms: int) -> tuple[Tool, ...]:

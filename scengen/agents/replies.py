@@ -12,7 +12,7 @@ from .facts import Fact
 
 T = TypeVar("T")
 METADATA = "metadata"
-"""Name of the evidence that is no frame: instruction, robot, controller and readings."""
+"""Name of the evidence that is not a frame: instruction, robot, controller and readings."""
 OTHER = "other"
 """Name of a step that is none of the sub-goals in the vocabulary."""
 
@@ -130,7 +130,7 @@ class Planned:
         found = [] if self.steps else ["the plan has no step"]
         for name in [self.why.constraint, *(step.constraint for step in self.steps)]:
             if name not in ids:
-                found.append(f"{cut(name)} is no constraint of the artefact")
+                found.append(f"{cut(name)} is not a constraint of the artefact")
         return found + [f"your audit {name} failed" for name, passed in vars(self.audit).items() if not passed]
 
 
@@ -138,7 +138,7 @@ def read_json(text: str) -> Any:
     """The JSON value of a reply; a code fence around it is allowed, nothing else is.
 
     Raises:
-        FormatError: it is no JSON.
+        FormatError: it is not JSON.
     """
     fenced = re.fullmatch(r"\s*```(?:json)?\s*(.*?)\s*```\s*", text, re.S)
     if not text.strip():
@@ -153,13 +153,13 @@ def understanding(text: str, facts: Sequence[Fact]) -> Understanding:
     """Read the artefact of stage 1.
 
     Raises:
-        FormatError: it does not follow the schema, answers a question twice, or names what is no question or option.
+        FormatError: it does not follow the schema, answers a question twice, or names what is not a question or option.
     """
     found = _filled(Understanding, text)
     known, told = {fact.id: fact for fact in facts}, [each.fact for each in (*found.semantic, *found.unknown)]
     for name in told:
         if name not in known:
-            raise FormatError(f"{cut(repr(name))} is no question; known: {', '.join(known)}")
+            raise FormatError(f"{cut(repr(name))} is not a question; known: {', '.join(known)}")
         if told.count(name) > 1:
             raise FormatError(f"the question {name} is answered {told.count(name)} times")
     for claim in found.semantic:
@@ -167,7 +167,7 @@ def understanding(text: str, facts: Sequence[Fact]) -> Understanding:
         if isinstance(claim.answer, list) != bool(fact.options):
             raise FormatError(f"the answer to {fact.id} must be {'a list of options' if fact.options else 'a number'}")
         if isinstance(claim.answer, list) and (odd := [name for name in claim.answer if name not in fact.options]):
-            raise FormatError(f"{cut(repr(odd[0]))} is no option of {fact.id}")
+            raise FormatError(f"{cut(repr(odd[0]))} is not an option of {fact.id}")
     return found
 
 
@@ -180,7 +180,7 @@ def plan(text: str, vocabulary: Mapping[str, str]) -> Planned:
     found = _filled(Planned, text)
     for step in found.steps:
         if step.subgoal not in (*vocabulary, OTHER):
-            raise FormatError(f"{cut(repr(step.subgoal))} is no sub-goal; known: {', '.join((*vocabulary, OTHER))}")
+            raise FormatError(f"{cut(repr(step.subgoal))} is not a sub-goal; known: {', '.join((*vocabulary, OTHER))}")
     return found
 
 

@@ -309,7 +309,7 @@ def earlier(folder: Path) -> AgentSettings:
     """Settings of the last run in a folder.
 
     Raises:
-        BadConfig: there is none.
+        BadConfig: it does not exist.
     """
     try:
         return typed("", AgentSettings, json.loads((folder / SETTINGS).read_text()))

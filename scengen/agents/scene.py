@@ -17,7 +17,7 @@ from ..robots.jaw import OPENING
 from ..sim.embodiment import JAW, SUCTION, hands
 
 READINGS = ("eef_pos", "eef_quat", "gripper_qpos", "force_torque")
-"""Streams whose readings are told, as endings of their names."""
+"""Streams whose readings are given to the model, as endings of their names."""
 ARMS = {1: "one Franka Panda arm", 2: "two Franka Panda arms, the right one first"}
 """Arms in words, by their number."""
 HANDS = {JAW: f"a parallel jaw that opens {1000 * OPENING:.0f} mm wide", SUCTION: "a suction cup"}

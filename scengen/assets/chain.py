@@ -36,7 +36,7 @@ class Defect(Bounded):
     """Distance of that tile from the line of the chain."""
     side: int = param(1, "0 right, 1 left", 0, 1)
     stretch: float = param(1.25, "tile heights", 1.02, 2.0)
-    """Widest space of a drifting chain, the one before its slab."""
+    """Widest space of a drifting chain, the previous one its slab."""
 
     def broken(self, count: int) -> int:
         """Index of the tile that is beside the chain or missing, in a chain of `count` tiles; never the first tile."""
@@ -67,7 +67,7 @@ class Chain:
     def gaps(self) -> NDArray[np.float64]:
         """Free spaces between the tiles and before the slab [m], shape (count,).
 
-        In a drifting chain each space is larger than the one before by the same factor, and their sum is that of an
+        In a drifting chain each space is larger than the previous one by the same factor, and their sum is that of an
         intact chain. So first tiles and slabs of all chains stand in rows, and only the spacing shows the defect.
         """
         if self.defect is None or self.defect.kind != DRIFT:
@@ -98,7 +98,7 @@ class Lanes:
     """Parallel chains side by side, the first on the right. First tiles stand in one row, slabs in another.
 
     All chains but one lead to the same slab, which stands across their lanes. The first or the last one may lead to a
-    slab of its own, the decoy.
+    separate slab, the decoy.
     """
 
     chains: tuple[Chain, ...]

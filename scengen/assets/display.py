@@ -63,7 +63,7 @@ def place_with_display(
 
 
 def show_typed(world: World, body: str, count: int) -> None:
-    """Show the first letters of the word bold, wherever the keyboard is now. For `events`."""
+    """Show the first letters of the word bold at the current place of the keyboard. For `events`."""
     keyboard = world.body(body)
     for k in range(count):
         world.move(f"typed_{k}", world.data.xpos[keyboard], world.data.xquat[keyboard])

@@ -103,10 +103,10 @@ def lay_mat(scene: mujoco.MjSpec, friction: float) -> None:
 class Way(NamedTuple):
     """A straight way of a ball between two bounces."""
 
-    begins: float
-    """Time at which it begins [s]."""
+    starts: float
+    """Time at which it starts [s]."""
     at: Vec3
-    """Position at which it begins [m]."""
+    """Position at which it starts [m]."""
     velocity: Vec3
     """Velocity of the ball on it [m/s]."""
 
@@ -168,16 +168,16 @@ class PlacedEnclosure:
             friction: friction between ball and floor.
             restitution: another restitution of the walls, such as 1 for mirror images.
         """
-        axes, found, begins = about_z(self.yaw), [], 0.0
+        axes, found, starts = about_z(self.yaw), [], 0.0
         while True:
             if friction:
                 at, velocity, surface = as_if_rolling(at, velocity, surface, friction)
             ways = self.enclosure.ways(axes.T @ (at - self.mouth), axes.T @ velocity, radius, restitution)
-            ways = [Way(begins + w.begins, self.mouth + axes @ w.at, axes @ w.velocity) for w in ways]
+            ways = [Way(starts + w.starts, self.mouth + axes @ w.at, axes @ w.velocity) for w in ways]
             if not friction or len(ways) == 1:
                 return found + ways
             found.append(ways[0])
-            begins, at, velocity = ways[1]
+            starts, at, velocity = ways[1]
             surface = _spin_after_bounce(velocity, surface, friction)
 
 

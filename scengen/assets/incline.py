@@ -179,11 +179,11 @@ class LoadedIncline:
         return min(self.rate * max(0.0, time - self.start), self.incline.turns)
 
     def slips(self, lane: int, error: float = 0.0) -> float:
-        """Slope at which the block of a lane begins to slide [rad], its friction being larger by a share `error`."""
+        """Slope at which the block of a lane starts to slide [rad], its friction being larger by a share `error`."""
         return slip_angle(self.loads[lane].friction * (1.0 + error))
 
     def slide_start(self, lane: int, error: float = 0.0) -> float:
-        """Time at which it begins to slide [s]."""
+        """Time at which it starts to slide [s]."""
         return self.start + (self.slips(lane, error) - math.radians(self.incline.least)) / self.rate
 
     def slide_time(self, lane: int, way: float) -> float:

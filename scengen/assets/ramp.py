@@ -94,7 +94,7 @@ class Ramp(Prop):
 
     @property
     def foot(self) -> float:
-        """Position s at which the far incline begins: half the length of the arc [m]."""
+        """Position s at which the far incline starts: half the length of the arc [m]."""
         return self.bend * self.slope
 
     @property

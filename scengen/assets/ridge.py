@@ -15,7 +15,7 @@ PLATE_MARGIN = 0.010
 
 @dataclass(frozen=True, kw_only=True)
 class Ridge(Prop):
-    """A ridge along x. The origin is the middle of the base. The ridge is a body of its own, which goals can name."""
+    """A ridge along x. The origin is the middle of the base. The ridge is a separate body, which goals can name."""
 
     width: float = param(0.012, "m", 0.003, 0.04)
     """Width of the flat top, along y."""

@@ -244,7 +244,7 @@ class Ycb(Prop):
         return prop
 
     @property
-    def told(self) -> dict[str, float]:
+    def features(self) -> dict[str, float]:
         """Features for scenarios: `scanned` if a scan replaces the proxy, else none."""
         return {"scanned": 1.0} if self.scan else {}
 

@@ -46,7 +46,7 @@ the last one."""
 TIERS = tuple(TIER_SHARES)
 """All tiers, in the order in which they are played."""
 LEAKS = "leaks"
-"""Tier of observations that tell hidden parameters. It plays nothing, see `scengen.ood.analysis.leaks`."""
+"""Tier of observations that reveal hidden parameters. It plays nothing, see `scengen.ood.analysis.leaks`."""
 RATED = (
     *(tier for tier in TIERS if tier not in (PRIOR, MEMORY)),
     *(f"{PRIOR}_{count}" for count in GUESSES),
@@ -106,7 +106,7 @@ class Archive:
     visits: Counter[tuple[bool, Signature]] = field(default_factory=Counter)
     """Number of visits of each cell."""
     successes: list[tuple[Hit, Node | None, tuple[Macro, ...]]] = field(default_factory=list)
-    """Successes, each with the state from which it began, and its macros."""
+    """Successes, each with the state from which it started, and its macros."""
 
     def add(self, state: ArchivedState) -> None:
         """Keep a state; a cell keeps its four latest ones."""
@@ -160,7 +160,7 @@ class Attack:
     ):
         """
         Args:
-            number, of: number of the scenario, and of all scenarios. Each scenario begins with its own part of the
+            number, of: number of the scenario, and of all scenarios. Each scenario starts with its own part of the
                 tiers that are lists.
             priors: fixed answers of the task.
             until: test of a hit at which the attack ends.

@@ -63,25 +63,25 @@ class AttackSettings:
     json: str | None = None
 
     @property
-    def asked(self) -> Sequence[str] | None:
+    def requested(self) -> Sequence[str] | None:
         """The requested tiers; None for the default."""
         return [self.tiers] if isinstance(self.tiers, str) else self.tiers
 
     @property
     def observed(self) -> bool:
         """Whether observations are searched for hidden parameters: on request, and by default for draws of a task."""
-        return self.pool is None if self.asked is None else LEAKS in self.asked
+        return self.pool is None if self.requested is None else LEAKS in self.requested
 
     @property
     def chosen(self) -> tuple[str, ...]:
         """The tiers that are played."""
-        return tuple(tier for tier in TIERS if self.asked is None or tier in self.asked)
+        return tuple(tier for tier in TIERS if self.requested is None or tier in self.requested)
 
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""
         check_rules(self.rules)
         at_least(self, n=1, budget=1, seed=0, workers=1, limit_seconds=1, limit_mb=200)
-        for tier in self.asked or []:
+        for tier in self.requested or []:
             if tier not in (*TIERS, LEAKS):
                 raise UnknownName("tier", tier, (*TIERS, LEAKS))
 
@@ -322,7 +322,7 @@ def fitted(task: Task, settings: AttackSettings) -> list[Prior]:
 def _by_rollouts(task: Task) -> AnswerJudge:
     def judge(scenario: Scenario) -> Callable[[float], bool]:
         world, answer = world_of(scenario, task.embodiment), scenario.answer()
-        assert answer is not None, "asked for once for the family"
+        assert answer is not None, "fitted once for the family"
 
         def right(value: float) -> bool:
             def guess(world: World) -> Plan:
@@ -353,9 +353,9 @@ def _report(
     untried = tuple(UntriedShortcut(**one) for record in records for one in record["untried"])
     cpu = sum(record["cpu"] for record in records)
     lost = tuple(f"{record['scenario']} {record['lost']}" for record in records if record["lost"])
-    told = tuple(_sorted(rates(counts)))
+    sorted_rates = tuple(_sorted(rates(counts)))
     return AttackReport(
-        task.name, task.version, rules, tuple(order), told, tuple(hits), priors, untried, lost, folder, cpu
+        task.name, task.version, rules, tuple(order), sorted_rates, tuple(hits), priors, untried, lost, folder, cpu
     )
 
 

@@ -9,7 +9,7 @@ from .servo import SERVO
 from .variations import WITNESS
 
 TIERS = (SERVO, RETRY, WITNESS, RANDOM, SEARCH)
-"""Tiers of the check. Shortcuts have a check of their own. Fixed answers, memories and foreign witnesses need other
+"""Tiers of the check. Shortcuts have a separate check. Fixed answers, memories and foreign witnesses need other
 scenarios, and a certificate depends on its own scenario alone."""
 
 

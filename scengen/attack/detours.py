@@ -1,7 +1,8 @@
 """Tier of detours: on the way, something is done that the oracle does not do, and its solution goes on from there.
 
-A rule that nobody can break without losing is no rule. An attempt makes a move beside its place, presses what it holds
-on another body, pushes a body before it is taken, or opens the jaw a little. What has moved is taken where it is now.
+A rule that cannot be broken without losing the episode has no effect. An attempt makes a move beside its place, presses
+what it holds on another body, pushes a body before it is taken, or opens the jaw a little. What has moved is taken
+where it is now.
 """
 
 from collections.abc import Iterator
@@ -26,9 +27,9 @@ WAYS = ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0
 """Directions in which a move misses."""
 CLEAR_WAY = 0.10
 """Length of the straight way on which a hand comes to a body that it pushes aside, and leaves it [m]."""
-BESIDE = 0.07
+DESCENT_OFFSET = 0.07
 """Distance beside its grasp at which a hand comes down beside a body [m]."""
-INTO = 0.015
+PUSH_OFFSET = 0.015
 """Distance beside its grasp to which closed fingers then move [m]: they push a cube of 4 cm by some 2 cm."""
 PRESSED = 0.1
 """Time for which a held body is pressed on another one [s]."""
@@ -90,7 +91,12 @@ def _aside(player: Player, number: int, row: int, turn: int) -> Iterator[Macro]:
     hand, rot = player.trace.hands[row, number], player.trace.rots[row, number]
     side, back = (1.0, 1.0, -1.0, -1.0)[turn] * rot[:, turn % 2], CLEAR_WAY * rot[:, 2]
     numbers, grip = between(np.eye(3), rot), OPEN if player.world.arms[number].suction else CLOSED
-    for place in (hand - back + BESIDE * side, hand + BESIDE * side, hand + INTO * side, hand - back + INTO * side):
+    for place in (
+        hand - back + DESCENT_OFFSET * side,
+        hand + DESCENT_OFFSET * side,
+        hand + PUSH_OFFSET * side,
+        hand - back + PUSH_OFFSET * side,
+    ):
         yield Macro("go", "", (*map(float, (*place, *numbers)), grip), number)
 
 

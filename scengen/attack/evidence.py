@@ -79,7 +79,7 @@ class Hit:
     rules: Rules = STRICT
     """Rules under which it reaches the goal."""
     task_version: int | None = None
-    """Version of the task that was attacked; None in hits of earlier releases, which do not tell it."""
+    """Version of the task that was attacked; None in hits of earlier releases, which do not store it."""
 
     @property
     def refutes(self) -> bool:
@@ -127,8 +127,8 @@ class Hit:
             return cls(**about, actions=actions)
         except (OSError, ValueError, TypeError, KeyError, EOFError, MemoryError, BadZipFile, zlib.error) as error:
             why = cut(" ".join(str(error).split()))
-            told = f"{path} is not a hit of scengen attack, or is damaged: {why}"
-            raise BadConfig(f"{told}; give one that scengen attack has stored") from None
+            message = f"{path} is not a hit of scengen attack, or is damaged: {why}"
+            raise BadConfig(f"{message}; give one that scengen attack has stored") from None
 
 
 def _plain_hit(about: Any) -> dict[str, Any]:
@@ -158,9 +158,10 @@ def _plain_hit(about: Any) -> dict[str, Any]:
         demand(_is_number(number), f"params has no number for {cut(name)}")
     lacks, unmoved = about["lacks"], about["unmoved"]
     demand(
-        isinstance(lacks, list) and all(isinstance(p, list) and len(p) == 2 for p in lacks), "lacks is no list of pairs"
+        isinstance(lacks, list) and all(isinstance(p, list) and len(p) == 2 for p in lacks),
+        "lacks must be a list of pairs",
     )
-    demand(isinstance(unmoved, list), "unmoved is no list of bodies")
+    demand(isinstance(unmoved, list), "unmoved must be a list of bodies")
     for name in (*(name for pair in lacks for name in pair), *unmoved):
         check_text("the name of a body", name, 200)
     return {**about, "lacks": tuple((one, other) for one, other in lacks), "unmoved": tuple(unmoved)}
@@ -239,7 +240,7 @@ def hit(
     """The evidence of a success; None if the success is not the same, bit for bit, in a fresh world.
 
     Args:
-        node: state from which the attempt began; None for the start of the episode.
+        node: state from which the attempt started; None for the start of the episode.
         causal: contacts of the witness that a hit should have.
     """
     fresh = World.load(player.scene_xml, player.embodiment)

@@ -49,7 +49,7 @@ from ..skills.motion import CLOSED, OPEN, Pace, alone, closing_along, go_to, hol
 from . import plans
 from .solids import Solid, held
 
-FAST = Pace(0.30, 0.02, give_up=2.5)
+FREE_PACE = Pace(0.30, 0.02, give_up=2.5)
 """Pace through free space. Moves of the adversary give up early: a failed attempt costs time."""
 LADEN = Pace(0.20, 0.008, give_up=3.0)
 """Pace with a body in the hand, or over a place: at 0.30 m/s the hand overshoots by 1 to 2 cm."""
@@ -62,7 +62,7 @@ PUSH_CLEARANCE = 0.015
 GONE_DISTANCE = 0.06
 """Distance from the hand above which a body counts as gone [m]."""
 CATCH_DISTANCE = 0.05
-"""Distance from the hand at which the hand begins to close on a body that returns [m]. On an incline of 25 deg the body
+"""Distance from the hand at which the hand starts to close on a body that returns [m]. On an incline of 25 deg the body
 then turns round 0.15 s later, which is the time that the fingers need."""
 MAX_GRASP_DEPTH = PALM_ABOVE - 0.004
 """Maximum height of the top of a body above the grip site of a hand that grasps it [m]."""
@@ -120,17 +120,17 @@ def _pick(field: MacroContext, macro: Macro) -> Plan:
         at = centre + (low + height * (high - low)) * UP if low < high else centre
         rot = closing_along(field.arm, closing)
         yield from _rise(field.arm, float(at[2]) + TRAVEL_HEIGHT)
-        yield from go_to(field.arm, at + TRAVEL_HEIGHT * UP, rot, FAST, OPEN)
+        yield from go_to(field.arm, at + TRAVEL_HEIGHT * UP, rot, FREE_PACE, OPEN)
         yield from go_to(field.arm, at, rot, APPROACH, OPEN)
         yield from grasp(field.arm)
-    yield from retreat(field.arm, lift, FAST)
+    yield from retreat(field.arm, lift, FREE_PACE)
 
 
 def _pick_by_suction(field: MacroContext, spot: Vec3, skew: float) -> Plan:
     arm = field.arm
     rot = closing_along(arm, about_z(skew) @ arm.hand_rot[:, 1])
     yield from _rise(arm, float(spot[2]) + TRAVEL_HEIGHT)
-    yield from go_to(arm, spot + 0.02 * UP, rot, FAST, OPEN)
+    yield from go_to(arm, spot + 0.02 * UP, rot, FREE_PACE, OPEN)
     yield from suction.suck(arm, spot, rot, give_up=1.5)
 
 
@@ -140,7 +140,7 @@ def _place(field: MacroContext, macro: Macro) -> Plan:
     if drop <= 0.0:
         yield from _lower_until_contact(field, macro.target, 0.04, speed)
     yield from release(field.arm)
-    yield from retreat(field.arm, TRAVEL_HEIGHT, FAST)
+    yield from retreat(field.arm, TRAVEL_HEIGHT, FREE_PACE)
 
 
 def _press(field: MacroContext, macro: Macro) -> Plan:
@@ -148,14 +148,14 @@ def _press(field: MacroContext, macro: Macro) -> Plan:
     yield from _move_over(field, macro.target, u, v, PUSH_CLEARANCE)
     yield from _lower_until_contact(field, macro.target, 0.04, speed)
     yield from _push_blindly(field.arm, -speed * UP, seconds)
-    yield from retreat(field.arm, TRAVEL_HEIGHT, FAST)
+    yield from retreat(field.arm, TRAVEL_HEIGHT, FREE_PACE)
 
 
 def _release(field: MacroContext, macro: Macro) -> Plan:
     seconds, rise = macro.numbers
     yield from release(field.arm, seconds)
     if rise > 0.0:
-        yield from retreat(field.arm, rise, FAST)
+        yield from retreat(field.arm, rise, FREE_PACE)
 
 
 def _catch(field: MacroContext, macro: Macro) -> Plan:
@@ -194,10 +194,10 @@ def _push(field: MacroContext, macro: Macro) -> Plan:
     z = centre[2] - up + height * 2 * up
     start[2] = z if load is None else max(z, centre[2] - up + below + 0.002)
     yield from _rise(arm, float(centre[2] + up + below + 0.03 + lag[2]))
-    yield from go_to(arm, [*(start + lag)[:2], arm.hand[2]], rot, FAST, CLOSED)
+    yield from go_to(arm, [*(start + lag)[:2], arm.hand[2]], rot, FREE_PACE, CLOSED)
     yield from go_to(arm, start + lag, rot, APPROACH, CLOSED)
     yield from _push_blindly(arm, speed * u, way / speed)
-    yield from retreat(arm, TRAVEL_HEIGHT, FAST)
+    yield from retreat(arm, TRAVEL_HEIGHT, FREE_PACE)
 
 
 # --- moves of the hand alone --------------------------------------------------------------------
@@ -346,8 +346,8 @@ KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
 
 def _rise(arm: Arm, height: float) -> Plan:
     """Move straight up to a height [m], if the hand is lower."""
-    if arm.hand[2] < height - FAST.within:
-        yield from go_to(arm, [*arm.hand[:2], height], pace=FAST)
+    if arm.hand[2] < height - FREE_PACE.within:
+        yield from go_to(arm, [*arm.hand[:2], height], pace=FREE_PACE)
 
 
 def _move_over(field: MacroContext, target: str, u: float, v: float, above: float) -> Plan:
@@ -377,6 +377,6 @@ def _lower_until_contact(field: MacroContext, target: str, farthest: float, spee
 
 
 def _push_blindly(arm: Arm, velocity: Vec3, seconds: float) -> Plan:
-    """Push at a constant velocity for a time [s], whatever is in the way."""
+    """Push at a constant velocity for a time [s], without stopping at contact."""
     world, end = arm.world, arm.world.time + seconds - Loop.PERIOD / 2
     yield from push(arm, velocity, lambda: world.time > end, give_up=seconds + 1.0)

@@ -1,6 +1,6 @@
 """Feedback plans around a puzzle: pursue, press down, stand in the way, cradle, loosen, carry through narrow ways.
 
-People who attack a task by hand begin here (`docs/cheats.md`), and so does the tier `servo` of the adversary. The plans
+People who attack a task by hand start here (`docs/cheats.md`), and so does the tier `servo` of the adversary. The plans
 know bodies and arms, but no task. They read poses and velocities as a policy with a good camera would, and no parameter
 of the scenario.
 """
@@ -41,7 +41,7 @@ HOVER_HEIGHT = 0.06
 """Height above a body at which a hand follows it before it comes down [m]."""
 LOWEST_HAND = TABLE_TOP + TIP_BELOW + 0.003
 """Lowest position of the grip site of a hand that points down [m]: the tips keep 3 mm from the table."""
-SLOW = 0.02
+STOPPED_SPEED = 0.02
 """Speed below which a body counts as stopped [m/s]."""
 KEEP = 0.0
 """Gripper command that keeps the gap."""
@@ -140,7 +140,7 @@ def block_and_pick(arm: Arm, body: str, lead: float = 0.3, seconds: float = 15.0
     end = world.time + seconds
     while world.time < end:
         velocity = velocity_of(arm, body)
-        if world.touching(arm.label, body) and np.linalg.norm(velocity) < SLOW:
+        if world.touching(arm.label, body) and np.linalg.norm(velocity) < STOPPED_SPEED:
             break
         goal = world.com(body) + lead * velocity
         goal[2] = max(float(world.com(body)[2]), LOWEST_HAND)
@@ -185,7 +185,7 @@ def await_turn(arm: Arm, body: str, angle: float = math.radians(20.0), seconds: 
     end = arm.world.time + seconds
     while arm.world.time < end:
         velocity = velocity_of(arm, body) * [1.0, 1.0, 0.0]
-        if (speed := float(np.linalg.norm(velocity))) > SLOW:
+        if (speed := float(np.linalg.norm(velocity))) > STOPPED_SPEED:
             course = velocity / speed if course is None else course
             if course @ velocity < speed * math.cos(angle):
                 return
@@ -211,7 +211,7 @@ def meet(arm: Arm, body: str, at: ArrayLike, rot: Mat3, periods: int = 2, second
         return float(np.linalg.norm(velocity_of(arm, body)))
 
     def leaving() -> bool:
-        return float(velocity_of(arm, body) @ (world.com(body) - goal)) > 0.0 and speed() > SLOW
+        return float(velocity_of(arm, body) @ (world.com(body) - goal)) > 0.0 and speed() > STOPPED_SPEED
 
     def near() -> bool:
         return float(np.linalg.norm(world.com(body) - goal)) < NEAR_DISTANCE
@@ -252,7 +252,7 @@ def stop_and_bring(
         yield from go_to(arm, at, before, WAY, OPEN)
 
     def stopped() -> bool:
-        return world.touching(arm.label, body) and float(np.linalg.norm(velocity_of(arm, body))) < SLOW
+        return world.touching(arm.label, body) and float(np.linalg.norm(velocity_of(arm, body))) < STOPPED_SPEED
 
     yield from until(hold(arm, seconds, OPEN), stopped)
     with suppress(GaveUp):
@@ -443,6 +443,6 @@ def extent(arm: Arm, body: str, direction: Vec3) -> float:
 def _across(arm: Arm, velocity: Vec3, skew: float) -> Mat3:
     """Orientation of a hand that points down and closes at an angle to a velocity; unchanged for a body at rest."""
     speed = math.hypot(velocity[0], velocity[1])
-    if speed < SLOW:
+    if speed < STOPPED_SPEED:
         return arm.hand_rot
     return closing_along(arm, about_z(skew) @ (np.array([velocity[0], velocity[1], 0.0]) / speed))

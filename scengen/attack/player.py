@@ -36,7 +36,7 @@ class Attempt:
     macros: tuple[Macro, ...]
     """Moves, in order."""
     stage: int | None = None
-    """Stage of the witness at which the attempt begins; None for the start of the episode."""
+    """Stage of the witness at which the attempt starts; None for the start of the episode."""
 
     def __str__(self) -> str:
         return "; ".join(map(str, self.macros)) or "nothing more"

@@ -44,7 +44,7 @@ AnswerJudge = Callable[[Scenario], Callable[[float], bool]]
 def by_statics(scenario: Scenario) -> Callable[[float], bool]:
     """The family's own test of an answer, which needs no rollout."""
     answer = scenario.answer()
-    assert answer is not None and answer.right is not None, "asked for once for the family"
+    assert answer is not None and answer.right is not None, "fitted once for the family"
     return answer.right
 
 

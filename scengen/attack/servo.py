@@ -37,20 +37,20 @@ STOP_PITCHES = (math.radians(30.0), 0.0)
 """Angles by which a hand that stops a swinging body looks higher than where the witness takes it [rad]."""
 QUARTER = math.pi / 2
 """Turn of the hand that puts its narrow side across the way [rad]."""
-HIGH = (0.2, 0.0, 0.0)
+HIGH_ROUTE = (0.2, 0.0, 0.0)
 """The way to carry a body high over everything; see `ROUTES`."""
 ROUTES = (
     (0.005, QUARTER, 0.0),
     (0.12, 0.0, 0.0),
     (0.005, 0.0, 0.0),
-    HIGH,
+    HIGH_ROUTE,
     (0.02, 0.0, 0.2),
     (0.02, 0.0, -0.2),
     (0.12, QUARTER, 0.0),
 )
 """Ways to carry a body: height above its goal [m], turn of the hand [rad], and the largest distance to the left of the
 straight way [m]. They go through a gap, over an obstacle, straight, high, and around both sides."""
-CARRIED = tuple(dict.fromkeys((HIGH, *ROUTES)))
+CARRIED = tuple(dict.fromkeys((HIGH_ROUTE, *ROUTES)))
 """The same ways, the one over everything first: there the height of the drop matters most."""
 RAISE = 0.008
 """Height above its way at which a body is carried along it [m]: the fingers keep off the table."""
@@ -97,7 +97,7 @@ def chased(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
 def stopped(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
     """Stop a hinged body that moves by itself where it is fastest, and bring it to where the witness takes it.
 
-    Or pursue, press down and block it wherever it is.
+    Or pursue it, press it down and block it at its current place.
     """
     if place := player.trace.hand_at(arm.number, body):
         lowest = tuple(map(float, fastest_place(player, body)))
@@ -131,20 +131,20 @@ def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
     for skew in (0.0, QUARTER):
         take = turned(player, arm, body, skew, 0.0)
         yield Attempt(SERVO, (take, Macro("along", body, (skew, RAISE), arm.number)))
-    asked = asked_of(player, body)
+    asked = must_touch(player, body)
     every = product(range(len(DROPS)), range(len(CARRIED)))
     for drop, route in ((DROPS[i], CARRIED[k]) for i, k in sorted(every, key=sum)):
         goal = bring(player, arm, body, route, drop)
         yield Attempt(SERVO, (pick, goal))
         if asked:
-            yield Attempt(SERVO, (pick, *touched_there(player, arm, body, asked), goal))
+            yield Attempt(SERVO, (pick, *touched_at_goal(player, arm, body, asked), goal))
             yield Attempt(SERVO, (pick, *touched_straight(player, arm, body, asked), goal))
 
 
 def all_carried(player: Player, arm: Arm, bodies: Sequence[str]) -> Iterator[Attempt]:
     """Every handled body in the order of the witness: take it, touch with it what the goal asks for, carry it there."""
-    asked = {body: asked_of(player, body) for body in bodies}
-    touches = (touched_there, touched_straight, untouched) if any(asked.values()) else (untouched,)
+    asked = {body: must_touch(player, body) for body in bodies}
+    touches = (touched_at_goal, touched_straight, untouched) if any(asked.values()) else (untouched,)
     for route, skew, drop, touch in product(CARRIED, (0.0, QUARTER), DROPS, touches):
         moves: list[Macro] = []
         for body in bodies:
@@ -153,7 +153,7 @@ def all_carried(player: Player, arm: Arm, bodies: Sequence[str]) -> Iterator[Att
         yield Attempt(SERVO, tuple(moves))
 
 
-def touched_there(player: Player, arm: Arm, body: str, others: Sequence[str]) -> list[Macro]:
+def touched_at_goal(player: Player, arm: Arm, body: str, others: Sequence[str]) -> list[Macro]:
     """Macros that touch other bodies with the one in the hand, where they touch in the witness, from above."""
     places = [player.trace.place_at(body, body, other) for other in others]
     return [Macro("touch", other, place, arm.number) for other, place in zip(others, places, strict=True)]
@@ -228,7 +228,7 @@ def bring(player: Player, arm: Arm, body: str, route: tuple[float, float, float]
     return Macro("bring", body, (*map(float, player.goal_place(body)), *route, drop), arm.number)
 
 
-def asked_of(player: Player, body: str) -> tuple[str, ...]:
+def must_touch(player: Player, body: str) -> tuple[str, ...]:
     """Bodies of the scene that a body must have touched for the goal, in the order of the witness."""
     asked = {other for pair in player.latches if body in pair for other in pair} - {body}
     pairs = [pair for _, pair in player.trace.events if body in pair]
@@ -236,7 +236,7 @@ def asked_of(player: Player, body: str) -> tuple[str, ...]:
 
 
 def fastest_place(player: Player, body: str) -> Vec3:
-    """Where a body that nobody touches is fastest in the first seconds [m]: the lowest place of a pendulum."""
+    """Place at which a body that is not touched is fastest in the first seconds [m]: the lowest place of a pendulum."""
     world = player.world
     seen = [(float(np.linalg.norm(world.velocity(body)[3:])), *world.com(body)) for _ in player.idle(IDLE_TIME)]
     return np.array(max(seen)[1:])

@@ -1,4 +1,5 @@
-"""The signature of a rollout, which tells how it reached the goal: the bodies that touched, and those that moved."""
+"""The signature of a rollout, which describes how it reached the goal: the bodies that touched, and those that
+moved."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -68,7 +69,7 @@ def scene_bodies(world: World) -> dict[int, str]:
 def robots(world: World) -> dict[int, str]:
     """Name of the robot in pairs, by its row in the table of contacts: `ROBOT`, or with two arms the label of each.
 
-    The arms are told apart because one arm that does the work of both bypasses the task.
+    The arms are distinguished because one arm that does the work of both bypasses the task.
     """
     if len(world.arms) == 1:
         return {len(world.loop.touched) - 1: ROBOT}

@@ -2,7 +2,7 @@
 
 Replayed as it is, a memory is open-loop. Used object-centrically, it works as MimicGen generates demonstrations
 (Mandlekar et al. 2023, arXiv:2310.17596): the path is cut where the hand turns to another body, each part is stored
-relative to that body, and feedback follows it wherever the body now is. The cuts follow from contacts and need no
+relative to that body, and feedback follows the body. The cuts follow from contacts and need no
 annotation. With two arms, each arm follows its own path.
 """
 
@@ -30,7 +30,7 @@ MIN_HOLD_TIME = 0.2
 MAX_FALL_TIME = 1.0
 """Maximum time that a released body may fall until it touches the body that it was brought to [s]."""
 FIXED_BODIES = {"world", "table"}
-"""Bodies that are no targets of the hand: they never move, and bodies that touch them are put down or slide."""
+"""Bodies that are not targets of the hand: they never move, and bodies that touch them are put down or slide."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class HandPath:
                 yield np.clip(action, -1.0, 1.0)
 
     def _grip(self, row: int) -> float:
-        """The gripper command in force when a part begins."""
+        """The gripper command in force when a part starts."""
         return float(self.actions[row - 1][6]) if row else -1.0
 
 

@@ -17,7 +17,7 @@ NO_SHIFT = (0.0, 0.0, 0.0)
 
 
 def perturbed(player: Player) -> Iterator[Attempt]:
-    """Every phase of the witness changed in one way, from the state at which it begins, the last phases first."""
+    """Every phase of the witness changed in one way, from the state at which it starts, the last phases first."""
     count = player.phases
     for k in reversed(range(count)):
         yield Attempt(WITNESS, rest(player, k + 1), k)

@@ -32,12 +32,12 @@ def disturbance(load: float, waiting: float, ratios: Mapping[str, Measure]) -> s
         waiting: share of the run's time for which it waited for a core.
         ratios: the measured ratios.
     """
-    told = []
+    parts = []
     if load > MAX_LOAD:
-        told.append(f"its load average was {load:.1f} at the start")
+        parts.append(f"its load average was {load:.1f} at the start")
     if waiting > MAX_WAIT:
-        told.append(f"the run waited for a core in {waiting:.0%} of the time")
+        parts.append(f"the run waited for a core in {waiting:.0%} of the time")
     wide = [name for name, ratio in ratios.items() if ratio.spread > MAX_SPREAD * ratio.median]
     if wide:
-        told.append(f"{', '.join(wide)} spread by more than {MAX_SPREAD:.0%}")
-    return "; ".join(told)
+        parts.append(f"{', '.join(wide)} spread by more than {MAX_SPREAD:.0%}")
+    return "; ".join(parts)

@@ -109,8 +109,8 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any], str]:
     share = Table("a control period of a rollout", "times MuJoCo", title="parts of a rollout", title_justify="left")
     for name, value in parts.items():
         share.add_row(name, f"{value:.2f}")
-    told = {"control_period_ms": periods, "rollout_parts": parts, "spread": spreads, "disturbed_by": noise}
-    return [table, beside, share], {**result, **told}, noise
+    values = {"control_period_ms": periods, "rollout_parts": parts, "spread": spreads, "disturbed_by": noise}
+    return [table, beside, share], {**result, **values}, noise
 
 
 def core(repeats: int) -> dict[str, Measure]:
@@ -150,7 +150,7 @@ def _rollout(scenario: Scenario, world: World, horizon: float, periods: int) -> 
 def parts_of_a_rollout(repeats: int) -> dict[str, float]:
     """Processor time of a control period of an oracle rollout, part by part, over the bare mj_step calls: 1 and more.
 
-    Each side does what the one before does, and one thing more.
+    Each side does what the previous one does, and one thing more.
     """
     task = compose.load_task("domino_single")
     scenario = task.draw("id", 0, 0).scenario
@@ -165,7 +165,7 @@ def parts_of_a_rollout(repeats: int) -> dict[str, float]:
 
     def called() -> Iterator[None]:
         played.reset()
-        yield from _sliced(played.apply, actions)
+        yield from _sliced(played.step_filtered, actions)
 
     def episode() -> Iterator[None]:
         judged.reset()
@@ -193,7 +193,7 @@ def two_arms(repeats: int) -> dict[str, Measure]:
     def play(world: World, actions: Actions) -> Side:
         def steps() -> Iterator[None]:
             world.reset()
-            yield from _sliced(world.apply, actions)
+            yield from _sliced(world.step_filtered, actions)
 
         return steps
 

@@ -56,7 +56,7 @@ class Signals:
     def __init__(self) -> None:
         self.status = INTERRUPTED
         self.working = False
-        """Whether the command has begun. Before that, while modules are imported, nothing has to be cleaned up."""
+        """Whether the command has started. Before that, while modules are imported, nothing has to be cleaned up."""
         self.received = False
         """Whether the command has been interrupted."""
         self._finished = False
@@ -126,7 +126,7 @@ def _interrupted(argv: Sequence[str]) -> int:
 
 
 def _status_of(error: Exception) -> int:
-    """Tell an error in one line. Returns the exit status."""
+    """Print an error in one line. Returns the exit status."""
     if isinstance(error, ScengenError):
         return _failed(str(error), _write_traceback(error) if isinstance(error, ForeignCode) else "")
     if isinstance(error, BrokenPipeError):

@@ -67,7 +67,7 @@ CONTINUING = (
 
 
 def parsed(words: Sequence[str]) -> tuple[str, list[str]]:
-    """The command or form that a command line begins with, by its present name, and the rest of the line."""
+    """The command or form that a command line starts with, by its present name, and the rest of the line."""
     first, *rest = words
     if first in RENAMED:
         return RENAMED[first], rest

@@ -23,12 +23,12 @@ class _Announcement(event.Listener):
     """Listener that prints the notice at the first compilation."""
 
     def __init__(self) -> None:
-        self._told = False
+        self._printed = False
 
     def on_start(self, event: event.Event) -> None:
         what = (event.data or {})["dispatcher"].py_func.__module__
-        if not self._told and what.startswith(f"{__package__}."):
-            self._told = True
+        if not self._printed and what.startswith(f"{__package__}."):
+            self._printed = True
             with suppress(OSError, ValueError):  # the notice is not worth an error where standard error is closed
                 print(NOTICE, file=sys.stderr, flush=True)
 

@@ -67,7 +67,7 @@ class Loop:
 
     After every call, the poses in `data` (xpos, xquat, site_xpos ...) are those of the current qpos. Velocities,
     sensors and contacts in it are those of the last physics step, 2 ms before, as in robosuite. `data` may be changed
-    between two periods, because each begins with a fresh mj_step1.
+    between two periods, because each starts with a fresh mj_step1.
     """
 
     PERIOD = 0.01
@@ -181,7 +181,7 @@ class Loop:
         """Record the contacts of a physics step that another simulator makes, between its mj_step1 and mj_step2.
 
         A suction cup that is switched on but not sealed is switched off for this step, and a jammed gripper is opened.
-        `first`: whether the step begins a control period.
+        `first`: whether the step starts a control period.
         """
         _watch(self._scene, self._arms, self._owner, self._tight, self._latches, first)
 

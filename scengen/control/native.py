@@ -159,7 +159,7 @@ def _locate(model: mujoco.MjModel, data: mujoco.MjData) -> Layout:
     """The layout seen in one MjData that has at least two contacts of different force."""
     dist, geom = data.contact.dist, data.contact.geom
     stride = dist.strides[0]
-    # Which field a contact begins with is unknown. Its `dist` lies less than one stride after the start.
+    # Which field a contact starts with is unknown. Its `dist` lies less than one stride after the start.
     near = dist.ctypes.data
     force = np.zeros(6)
 

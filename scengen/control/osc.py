@@ -80,7 +80,7 @@ STATE = np.dtype(
     ]
 )
 """State of the controller: goal in the base frame [m], jaw command in [-1, 1] (or, in its first element, suction off
-(0) or on (1)), whether the gripper is forced open (1) whatever is commanded, initial angles [rad]."""
+(0) or on (1)), whether the gripper is forced open (1) against the command, initial angles [rad]."""
 
 WORK = np.dtype(
     [

@@ -24,7 +24,7 @@ from ..pool.demonstrations import (
 from ..pool.files import sha256
 from ..pool.manifest import PROCESS
 from ..pool.row import DemonstrationRow
-from ..runs.attempts import Progress, Wanted, extend, first_of, infeasible, rejection, writing_told
+from ..runs.attempts import Progress, Wanted, extend, first_of, infeasible, rejection, reported_write_errors
 from ..runs.journal import Journal, Record
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
@@ -236,7 +236,7 @@ def generate_demonstrations(
             limit = min(limit, size * settings.runs)
         limits = Limits(settings.limit_seconds, settings.limit_mb)
         extend(job, Wanted(KEPT, settings.n, limit, settings.workers, limits), records, journal, progress)
-        with writing_told(folder):
+        with reported_write_errors(folder):
             return finish(folder, task, config, settings.n, records, journal)
     finally:
         journal.close()

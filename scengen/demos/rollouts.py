@@ -1,4 +1,4 @@
-"""Rollouts of a policy, kept as demonstrations: of each pool in a folder of its own, failures included."""
+"""Rollouts of a policy, kept as demonstrations: of each pool in a separate folder, failures included."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -14,7 +14,7 @@ from ..pool import Pool
 from ..pool.demonstrations import DEMONSTRATIONS, POLICY, DemonstrationConfig
 from ..pool.files import sha256
 from ..pool.row import DemonstrationRow
-from ..runs.attempts import writing_told
+from ..runs.attempts import reported_write_errors
 from ..runs.journal import Journal, Record
 from ..samplers.task import Task
 from ..validate.labels import made_with
@@ -132,7 +132,7 @@ class _PoolKeeper:
     def finish(self) -> DemosSummary:
         """Write the rollouts that were kept."""
         records = self.journal.records()
-        with writing_told(self.folder):
+        with reported_write_errors(self.folder):
             return finish(
                 self.folder, self.task, self.config, len(records), records, self.journal, policy=self.settings.name
             )

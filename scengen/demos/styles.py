@@ -33,7 +33,7 @@ DETOUR = 0.03
 PAUSE = 0.4
 """Longest pause before a move through free space [s]."""
 HESITATES = 1 / 3
-"""Share of the moves through free space that begin with a pause. With a pause before each of them a plan of twenty such
+"""Share of the moves through free space that start with a pause. With a pause before each of them a plan of twenty such
 moves took five seconds longer, and one run of six of `seesaw_balance` exceeded the time limit."""
 DISPLACEMENT = 0.015
 """Displacement of the commanded position from which a run recovers [m]."""

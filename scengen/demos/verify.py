@@ -105,9 +105,9 @@ class Judge:
         if row.id != scenario.id or as_json(row.params) != canonical(scenario):
             yield OfCode("the id does not belong to the parameters")
         if sha256(row.scene_xml) != row.scene_sha256:
-            yield "the scene has another sha256 than its row says"
+            yield "the scene has a different sha256 than its row says"
         if sha256(row.witness.tobytes()) != row.witness_sha256:
-            yield "the actions have another sha256 than their row says"
+            yield "the actions have a different sha256 than their row says"
         if np.abs(row.witness).max(initial=0.0) > 1.0:
             yield "there are actions outside [-1, 1]"
         if POLICY not in self.config.styles and not passed_filter(row.witness):
@@ -252,5 +252,5 @@ class _Order:
         if self.styles != dict(manifest.styles):
             self.wrong.append(f"{DEMONSTRATIONS} counts other styles than there are")
         if manifest.outcomes.get("success", 0) != sum(self.styles.values()):
-            self.wrong.append(f"{DEMONSTRATIONS} counts another number of successes than there are")
+            self.wrong.append(f"{DEMONSTRATIONS} counts a different number of successes than there are")
         return self.wrong

@@ -117,7 +117,7 @@ def versions_of(setting: str | list[str]) -> list[str]:
     """Versions in the setting `mujoco`, each once, in their order.
 
     Raises:
-        BadConfig: there is none.
+        BadConfig: it does not exist.
     """
     versions = [setting] if isinstance(setting, str) else list(dict.fromkeys(setting))
     if not versions:
@@ -125,11 +125,11 @@ def versions_of(setting: str | list[str]) -> list[str]:
     return versions
 
 
-def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) -> Environment:
+def environment(mujoco: str, report: Callable[[str], None] = lambda text: None) -> Environment:
     """The environment with a version of MuJoCo. It is made if it does not exist.
 
     Args:
-        told: called with a line if the environment is made, which takes seconds and needs the package index.
+        report: called with a line if the environment is made, which takes seconds and needs the package index.
 
     Raises:
         BadConfig: there is no such version, or the environment cannot be written.
@@ -143,7 +143,7 @@ def environment(mujoco: str, told: Callable[[str], None] = lambda text: None) ->
         folder.parent.mkdir(parents=True, exist_ok=True)
         with FileLock(folder.with_suffix(f"{folder.suffix}.lock")):
             if not (folder / READY).exists():
-                told(f"making an environment with mujoco {mujoco} in {folder}")
+                report(f"making an environment with mujoco {mujoco} in {folder}")
                 try:
                     _make(folder, mujoco, shared)
                 except BaseException:
@@ -169,11 +169,11 @@ def _make(folder: Path, mujoco: str, shared: str) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     venv.EnvBuilder(symlinks=True, with_pip=True).create(folder)
     python = folder / "bin" / "python"
-    asked = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary", ":all:"]
+    options = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary", ":all:"]
     (packages,) = (folder / "lib").glob("python*/site-packages")
     wanted = [f"mujoco=={mujoco}"]
     while wanted:
-        done = subprocess.run([python, "-m", "pip", *asked, *wanted], capture_output=True, text=True)
+        done = subprocess.run([python, "-m", "pip", *options, *wanted], capture_output=True, text=True)
         if done.returncode:
             raise BadConfig(_why_not(mujoco, done.stderr))
         wanted = _missing_parts(packages)

@@ -163,8 +163,8 @@ def answers(request: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     yield {"mujoco": mujoco.__version__, "fingerprint": fingerprint()}
     limits = Limits(request["limit_seconds"], request["limit_mb"])
     for folder in request["pools"]:
-        asked = (request["search"], request["level"], request["n"], request["workers"], limits)
-        for judgement in judge(folder, *asked):
+        given = (request["search"], request["level"], request["n"], request["workers"], limits)
+        for judgement in judge(folder, *given):
             yield {"pool": folder, **asdict(judgement)}
 
 

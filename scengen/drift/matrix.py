@@ -54,15 +54,15 @@ def matrix(pools: Sequence[Pool], found: Mapping[str, Mapping[str, Any]], level:
     for pool in pools:
         certified = {row.id: _certified(row.certificate, row.horizon) for row in islice(pool.rows(witness=False), n)}
         judged = {
-            mujoco: {one["id"]: one for one in told["judged"][str(pool.folder)]} for mujoco, told in found.items()
+            mujoco: {one["id"]: one for one in outcome["judged"][str(pool.folder)]} for mujoco, outcome in found.items()
         }
         for name in islice(pool.names(), n):
-            by = {mujoco: _entry(told[name.id]) for mujoco, told in judged.items()}
+            by = {mujoco: _entry(outcome[name.id]) for mujoco, outcome in judged.items()}
             about = {"pool": str(pool.folder), "task": pool.task, "id": name.id, "name": str(name)}
             scenarios.append({**about, "certificate": certified[name.id], "mujoco": by})
     return {
         "level": level,
-        "mujoco": {version: {"fingerprint": told["fingerprint"]} for version, told in found.items()},
+        "mujoco": {version: {"fingerprint": outcome["fingerprint"]} for version, outcome in found.items()},
         "pools": {
             str(pool.folder): {
                 "sha256": pool.sha256,
@@ -115,15 +115,15 @@ def under(result: Mapping[str, Any], version: str) -> dict[str, Any]:
     return total([row[version] for row in result["tasks"].values()])
 
 
-def cell(told: Mapping[str, Any]) -> str:
+def cell(counts: Mapping[str, Any]) -> str:
     """One entry of the matrix: numbers of scenarios by outcome (`9 / 1 / 0`), flipped checks, unknown scenarios.
 
     Args:
-        told: counts of a task, or `total`.
+        counts: counts of a task, or `total`.
     """
-    checks = ", ".join(f"{name} {times}" for name, times in told["checks"].items())
-    numbers = " / ".join(str(told[name]) for name in OUTCOMES[:3])
-    return numbers + (f" ({checks})" if checks else "") + (f", {told[UNKNOWN]} unknown" if told[UNKNOWN] else "")
+    checks = ", ".join(f"{name} {times}" for name, times in counts["checks"].items())
+    numbers = " / ".join(str(counts[name]) for name in OUTCOMES[:3])
+    return numbers + (f" ({checks})" if checks else "") + (f", {counts[UNKNOWN]} unknown" if counts[UNKNOWN] else "")
 
 
 def flips(result: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str, str, str]]:
@@ -159,9 +159,9 @@ def change(check: Mapping[str, Any]) -> str:
 def margins(certificate: Mapping[str, Any]) -> str:
     """The margins of a certificate, in words."""
     robust, numerics = certificate["robust"], certificate["numerics"]
-    told = [f"{robust['solved']} of {robust['runs']} jittered runs", _time(certificate)]
+    parts = [f"{robust['solved']} of {robust['runs']} jittered runs", _time(certificate)]
     fell = [name.replace("_", " ") for name, kept in numerics.items() if kept.get("witness") != "success"]
-    return ", ".join([*told, *(f"witness flips at {name}" for name in fell)])
+    return ", ".join([*parts, *(f"witness flips at {name}" for name in fell)])
 
 
 def _time(certificate: Mapping[str, Any]) -> str:
@@ -186,15 +186,17 @@ def remarks(result: Mapping[str, Any]) -> Iterator[str]:
             yield f"made with mujoco {version}, which is not among the versions: add it, as the control"
         elif fingerprints != {result["mujoco"][version]["fingerprint"]}:
             yield f"made with mujoco {version} on a machine that rounds differently: bits differ for that reason too"
-    scenes = Counter(version for one in result["scenarios"] for version, told in one["mujoco"].items() if told["scene"])
+    scenes = Counter(
+        version for one in result["scenarios"] for version, outcome in one["mujoco"].items() if outcome["scene"]
+    )
     for version, times in scenes.items():
         yield f"under mujoco {version} {times} scenes are built differently, by more than rounding"
 
 
 def tables(result: Mapping[str, Any]) -> list[Table]:
     """The matrix, and the flipped checks with their margins, if there are any."""
-    told = f"{' / '.join(OUTCOMES[:3])} under each MuJoCo, level {result['level']}"
-    found = Table("task", *result["mujoco"], title=told, title_justify="left")
+    message = f"{' / '.join(OUTCOMES[:3])} under each MuJoCo, level {result['level']}"
+    found = Table("task", *result["mujoco"], title=message, title_justify="left")
     for task, row in result["tasks"].items():
         found.add_row(task, *(cell(row[version]) for version in result["mujoco"]))
     if len(result["tasks"]) > 1:

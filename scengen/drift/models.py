@@ -21,7 +21,7 @@ FIELDS = {
 }
 """Compared fields of each kind of element."""
 SHAPES = ("type", "size", "pos", "quat")
-"""Fields of geoms that are no meshes."""
+"""Fields of geoms that are not meshes."""
 DOFS = ("damping", "frictionloss", "armature")
 """Fields of the first degree of freedom of a joint."""
 OPTIONS = ("timestep", "integrator", "solver", "cone", "impratio", "tolerance", "iterations", "density", "viscosity")

@@ -30,21 +30,21 @@ def measured(environments: Sequence[Environment], repeats: int) -> dict[str, dic
         for each in environments:
             found[each.mujoco] += [line["measures"] for line in each.lines(MODULE, {})]
     return {
-        version: {name: Measure(tuple(one[name] for one in told)) for name in told[0]}
-        for version, told in found.items()
+        version: {name: Measure(tuple(one[name] for one in results)) for name in results[0]}
+        for version, results in found.items()
     }
 
 
 def table(found: Mapping[str, Mapping[str, Measure]]) -> Table:
     """The measures, a column for each version, with their limits."""
-    told = Table("measure", *found, "limit", "what", title="bench by version of MuJoCo", title_justify="left")
+    rows = Table("measure", *found, "limit", "what", title="bench by version of MuJoCo", title_justify="left")
     for name in next(iter(found.values())):
         promise, cells = PROMISES[name], []
         for measures in found.values():
             kept = "" if promise.holds(measures[name].median) else " MISSED"
             cells.append(f"{measures[name].median:.2f} ± {measures[name].spread / 2:.2f}{kept}")
-        told.add_row(name, *cells, f"{promise.side} {promise.limit:g}", promise.what)
-    return told
+        rows.add_row(name, *cells, f"{promise.side} {promise.limit:g}", promise.what)
+    return rows
 
 
 def answers(request: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:

@@ -20,7 +20,7 @@ from .environment import answer
 
 PERIODS = 5
 """Control periods from one sample of a track to the next: 50 ms."""
-APART = (0.1, 1.0, 10.0)
+TRACK_DISTANCES = (0.1, 1.0, 10.0)
 """Distances between the places of a body under two versions that are looked for [mm]."""
 
 Track = list[dict[str, Any]]
@@ -60,7 +60,7 @@ def parted(one: Track, other: Track) -> list[dict[str, Any]]:
         if not apart:
             break
         body = max(sorted(apart), key=apart.__getitem__)
-        for limit in APART[len(found) :]:
+        for limit in TRACK_DISTANCES[len(found) :]:
             if apart[body] >= limit:
                 touching = sorted({*a["bodies"][body][1], *b["bodies"][body][1]})
                 found.append({"mm": limit, "seconds": a["at"], "body": body, "touching": touching})
@@ -69,12 +69,12 @@ def parted(one: Track, other: Track) -> list[dict[str, Any]]:
 
 def in_words(moments: Sequence[Mapping[str, Any]]) -> str:
     """What `parted` has found, in one line."""
-    told = [
+    parts = [
         f"{one['body']} {one['mm']:g} mm elsewhere after {one['seconds']:g} s, "
         f"touching {', '.join(one['touching']) or 'nothing'}"
         for one in moments
     ]
-    return "; ".join(told) or f"no body is {APART[0]:g} mm elsewhere while the actions last"
+    return "; ".join(parts) or f"no body is {TRACK_DISTANCES[0]:g} mm elsewhere while the actions last"
 
 
 def tracks(folder: str, search: Sequence[str], ids: Sequence[str]) -> Iterator[tuple[str, Track]]:

@@ -100,8 +100,8 @@ class _TracedWorld(World):
 
     path: list[list[Vec3]] = field(default_factory=list)
 
-    def apply(self, filtered: NDArray[np.float32]) -> None:
-        super().apply(filtered)
+    def step_filtered(self, filtered: NDArray[np.float32]) -> None:
+        super().step_filtered(filtered)
         self.path.append([arm.hand for arm in self.arms])
 
 

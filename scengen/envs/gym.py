@@ -113,7 +113,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     Reward: 1 when the goal is reached, else 0. `terminated` on success and on failure, `truncated` at the time limit.
     With `settle` a reached goal counts as in a certificate: it must still hold after the robot has been idle for one
     second, which is simulated within the last step.
-    `info` holds `success`, `is_success`, `time` [s], and at the end `reason`: nothing that tells scenarios apart. After
+    `info` holds `success`, `is_success`, `time` [s], and at the end `reason`: nothing that identifies a scenario. After
     `reset(options={"labels": True})` it also holds `scenario`, `scene_sha256`, `split` and `axes`, for evaluators.
 
     Threads may share an environment. Their calls run one after the other.
@@ -199,7 +199,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._row: PoolRow = self._rows[0]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles open the pools again and continue from the same state with a simulation of their own."""
+        """Copies and pickles open the pools again and continue from the same state with a separate simulation."""
         with self._lock:
             return _revived, (type(self), self._arguments, self._progress())
 
@@ -287,7 +287,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Advance one control period (10 ms), or `action_repeat` of them.
 
         Raises:
-            ValueError: the action has another shape than `action_space`, or is not finite. Nothing is simulated then.
+            ValueError: the action has a different shape than `action_space`, or is not finite. Nothing is simulated
+                then.
         """
         given = checked(action, action_size(self.task.embodiment))
         if self._world is None:
@@ -330,8 +331,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._world is None:
             return made
         episode = (self._episode.outcome, self._episode.reason, self._episode.held)
-        told = {"scenario": self._row.id, "world": self._world.state(), "episode": episode}
-        return {**made, **told, "played": [*self._played]}
+        entry = {"scenario": self._row.id, "world": self._world.state(), "episode": episode}
+        return {**made, **entry, "played": [*self._played]}
 
     def _continue(self, progress: Mapping[str, Any]) -> None:
         """Return to a `_progress()` of an environment with the same arguments."""
@@ -354,11 +355,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._episode = Episode(self._scenario, self._world, row.horizon, self.rules)
 
     def _play(self, given: NDArray[np.float32]) -> tuple[float, bool, bool, dict[str, Any]]:
-        """Take a step with a valid action, clipped unless there is a filter. Returns what `_told` does."""
+        """Take a step with a valid action, clipped unless there is a filter. Returns what `_answer` does."""
         outcome = None
         for _ in range(self.action_repeat):
             outcome = outcome or self._advance(given)
-        return self._told(outcome)
+        return self._answer(outcome)
 
     def _advance(self, action: NDArray[np.float32]) -> Outcome | None:
         self._simulate(action)
@@ -370,11 +371,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._played.append(sent)
         self._episode.begin()
         try:
-            self.world.apply(sent)
+            self.world.step_filtered(sent)
         except Unstable as error:
             self._episode.outcome, self._episode.reason = "unstable", str(error)
 
-    def _told(self, outcome: Outcome | None) -> tuple[float, bool, bool, dict[str, Any]]:
+    def _answer(self, outcome: Outcome | None) -> tuple[float, bool, bool, dict[str, Any]]:
         """Reward, whether the episode terminates, whether it is truncated, and the info.
 
         Args:
@@ -492,7 +493,7 @@ def clipped(reading: NDArray[np.float64], bound: float | NDArray[np.float64]) ->
 
 
 def _installed(task: str) -> int:
-    """Version of a task; 1 if its file cannot be read, of which an error tells when the task is loaded."""
+    """Version of a task; 1 if its file cannot be read, which raises an error when the task is loaded."""
     with suppress(ScengenError):
         return task_files.version(task)
     return 1

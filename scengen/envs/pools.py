@@ -87,8 +87,8 @@ def _checked(pool: AnyRows, task: str) -> AnyRows:
         raise PoolError(f"{pool.folder} holds no scenario; fill it with scengen generate")
     if others := {*tasks} - {task}:
         raise PoolError(f"{pool.folder} holds scenarios of {', '.join(sorted(others))}, not of {task}")
-    if told := of_another_version(pool):
-        warnings.warn(told, stacklevel=2)
+    if difference := of_another_version(pool):
+        warnings.warn(difference, stacklevel=2)
     return pool
 
 
@@ -98,5 +98,5 @@ def of_another_version(pool: Pool | Demonstrations) -> str:
     made = pool.manifest.task_version
     if made == here:
         return ""
-    told = f"{pool.folder} was made on version {made} of {pool.task}; installed: {here}"
-    return f"{told}; its scenes are played under the installed rules, see scengen verify"
+    message = f"{pool.folder} was made on version {made} of {pool.task}; installed: {here}"
+    return f"{message}; its scenes are played under the installed rules, see scengen verify"

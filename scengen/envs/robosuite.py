@@ -281,7 +281,7 @@ class RobosuiteEnv(ManipulationEnv):
         self.sim.data.qacc_warmstart[:] = 0.0  # the constructors of the controllers have changed it
         self.world.filter.reset()
         self.episode, self._substep = Episode(self.scenario, self.world, self.row.horizon, self.rules), 0
-        self._begun = False
+        self._started = False
 
     def _close_jaw(self) -> None:
         """Close the jaw of the first arm on what it holds at the start."""
@@ -294,11 +294,11 @@ class RobosuiteEnv(ManipulationEnv):
     def _pre_action(self, action: NDArray[np.float64], policy_step: bool = False) -> None:
         """Command the arms; robosuite calls it between mj_step1 and mj_step2 of every physics step."""
         assert len(action) == self.action_dim, f"an action has {self.action_dim} numbers, not {len(action)}"
-        actions = np.split(np.asarray(self.world.joined(action)), len(self.robots))
+        actions = np.split(np.asarray(self.world.with_partner_actions(action)), len(self.robots))
         for number, (robot, own) in enumerate(zip(self.robots, actions, strict=True)):
             # The scene's own arms get a new action in every control period, with any `control_freq`.
             robot.control(own, policy_step=policy_step if number < self._controlled_arms else self._substep == 0)
-        self.world.command(action)
+        self.world.record_grip(action)
         self.world.loop.watch(first=self._substep == 0)
 
     def _update_observables(self, force: bool = False) -> None:
@@ -336,8 +336,8 @@ class RobosuiteEnv(ManipulationEnv):
 
     def _begin_episode(self) -> None:
         """Run the scene's events of the first control period, unless they have been run."""
-        if not self._begun:
-            self._begun = True
+        if not self._started:
+            self._started = True
             self.episode.begin()
 
     def _end_period(self) -> None:

@@ -18,8 +18,8 @@ from ..installation import ROBOSUITE
 from ..robots import panda, suction
 from ..sim import scene_text
 
-REMEDY = "run pip install 'scengen[robosuite]', in an environment of its own"
-"""Remedy for whatever keeps robosuite's environments from running."""
+REMEDY = "run pip install 'scengen[robosuite]', in a separate environment"
+"""Remedy for every fault that keeps robosuite's environments from running."""
 
 
 class NoRobosuite(ScengenError, ImportError):

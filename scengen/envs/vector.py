@@ -1,6 +1,6 @@
 """Many environments in one process: `gymnasium.make_vec("scengen/domino_single-v1", num_envs=16, pool="generated/id")`.
 
-Every slot has a simulation of its own. Threads step the slots: the compiled control loop releases Python's lock.
+Every slot has its own simulation. Threads step the slots: the compiled control loop releases Python's lock.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +22,7 @@ from .observations import Reading
 from .pools import Folders
 
 MODES = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP, AutoresetMode.DISABLED)
-"""Modes in which a slot begins its next episode: in the step after the end, at once, or when it is reset."""
+"""Modes in which a slot starts its next episode: in the step after the end, at once, or when it is reset."""
 MASK = "reset_mask"
 """Reset option that chooses slots, as in Gymnasium's own vector environments."""
 MAX_SLOTS = 4096
@@ -40,14 +40,14 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
     Observations, rewards and infos have the slots along their first axis and are new arrays in every step. They have
     the bits of single environments, with any number of threads.
 
-    Scenarios are handed out in the order of the pools: `reset(seed=s)` begins number s in the first slot, s + 1 in the
+    Scenarios are handed out in the order of the pools: `reset(seed=s)` starts number s in the first slot, s + 1 in the
     second, and so on. A slot whose episode ends gets the next one that no slot has had; among several slots the first
     comes first. After the last scenario the first one follows.
 
-    With `AutoresetMode.NEXT_STEP` the step after the end of an episode ignores the slot's action and begins the next
+    With `AutoresetMode.NEXT_STEP` the step after the end of an episode ignores the slot's action and starts the next
     one. With `AutoresetMode.SAME_STEP` the step that ends an episode returns the first observation of the next one;
     `infos["final_obs"]` and `infos["final_info"]` hold the end of the old one. With `AutoresetMode.DISABLED` a slot
-    stays at the end of its episode, and its actions are ignored, until `reset(options={"reset_mask": mask})` begins
+    stays at the end of its episode, and its actions are ignored, until `reset(options={"reset_mask": mask})` starts
     another one.
     """
 
@@ -89,7 +89,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         self._rows, self._next = first._rows, 0
         self._labels = False
         self._terminated, self._truncated = np.zeros((2, self.num_envs), np.bool_)
-        self._begun = False
+        self._started = False
         self._infos: dict[str, NDArray[Any]] = {
             **{f"_{name}": np.ones(self.num_envs, np.bool_) for name in INFOS},
             **{name: np.zeros(self.num_envs, np.bool_) for name in ("success", "is_success")},
@@ -108,13 +108,13 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Reading], dict[str, Any]]:
-        """Begin an episode in every slot.
+        """Start an episode in every slot.
 
         Args:
             seed: number of the first slot's scenario, or the numbers for all slots; None for those that come next.
             options: `scenario` names the scenario of all slots, or of each; `labels` adds to `info` which scenario
                 runs, in later episodes too; `reset_mask`, shape (num_envs,), chooses the slots that begin an episode.
-                The episodes of the others go on; in the first reset they are over as soon as they have begun.
+                The episodes of the others go on; in the first reset they are over as soon as they start.
 
         Raises:
             UnknownName: there is no such scenario or option.
@@ -124,12 +124,12 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             raise UnknownName("reset option", unknown.pop(), (*RESET_OPTIONS, MASK))
         mask = self._mask((options or {}).get(MASK))
         self._labels = bool((options or {}).get("labels"))
-        first = not self._begun
+        first = not self._started
         fresh = np.flatnonzero(mask | first).tolist()
         numbers = self._numbers(seed, (options or {}).get("scenario"), fresh)
         infos = self._begin({slot: self._rows[number] for slot, number in numbers.items()})
         self._terminated, self._truncated = self._terminated & ~mask, (self._truncated | first) & ~mask
-        self._begun = True
+        self._started = True
         return self._observed(), self._gathered(infos)
 
     def step(self, actions: ArrayLike) -> Steps:
@@ -142,7 +142,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             ValueError: the actions have another shape, or one is not finite. Nothing is simulated then.
         """
         given = self._checked(actions)
-        if not self._begun:
+        if not self._started:
             raise BadConfig("no scenario is running; call reset first")
         over = self._terminated | self._truncated
         fresh = self._handed_out(over) if self._mode == AutoresetMode.NEXT_STEP else {}
@@ -164,7 +164,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
                     times[slot] = env.world.time
             for slot, outcome in outcomes.items():
                 if outcome is not None:
-                    rewards[slot], terminated[slot], truncated[slot], infos[slot] = self.envs[slot]._told(outcome)
+                    rewards[slot], terminated[slot], truncated[slot], infos[slot] = self.envs[slot]._answer(outcome)
 
         self._each(play, [slot for slot in range(self.num_envs) if slot not in fresh and not stays[slot]])
         if fresh:
@@ -173,8 +173,8 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         seen, final = self._observed(), dict[int, dict[str, Any]]()
         if self._mode == AutoresetMode.SAME_STEP and (over := terminated | truncated).any():
             for slot in np.flatnonzero(over).tolist():
-                told = {**infos[slot], **(self.envs[slot]._labels() if self._labels else {})}
-                final[slot] = {"final_obs": {name: value[slot] for name, value in seen.items()}, "final_info": told}
+                values = {**infos[slot], **(self.envs[slot]._labels() if self._labels else {})}
+                final[slot] = {"final_obs": {name: value[slot] for name, value in seen.items()}, "final_info": values}
             infos |= self._begin(self._handed_out(over))
             seen = self._observed()
         return seen, rewards, terminated, truncated, self._gathered(infos, final)
@@ -202,7 +202,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
     # --- scenarios ------------------------------------------------------------------------
 
     def _mask(self, given: Any) -> NDArray[np.bool_]:
-        """The slots that a reset begins, shape (num_envs,)."""
+        """The slots that a reset starts, shape (num_envs,)."""
         if given is None:
             return np.ones(self.num_envs, np.bool_)
         mask = np.asarray(given)
@@ -242,7 +242,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         return {slot: self._rows[self._following()] for slot in np.flatnonzero(over).tolist()}
 
     def _begin(self, rows: Mapping[int, PoolRow]) -> dict[int, dict[str, Any]]:
-        """Begin episodes in some slots, and return their infos."""
+        """Start episodes in some slots, and return their infos."""
         infos: dict[int, dict[str, Any]] = {}
 
         def load(slots: Sequence[int]) -> None:
@@ -305,7 +305,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         """The infos of the slots in arrays, as Gymnasium's vector environments give them.
 
         Args:
-            infos: infos of the slots whose episodes have begun or ended.
+            infos: infos of the slots whose episodes have started or ended.
             final: ends of the episodes that others have followed.
         """
         found: dict[str, Any] = {}

@@ -71,7 +71,7 @@ class Frozen:
         """
         found = LINE.fullmatch(line)
         if not found:
-            raise BadConfig(f"{where}: {cut(line)!r} is no scenario; it must be an index, an id and a sha256")
+            raise BadConfig(f"{where}: {cut(line)!r} is not a scenario; it must be an index, an id and a sha256")
         return cls(int(found[1]), found[2], found[3])
 
 
@@ -117,7 +117,7 @@ class Edition:
 
     @classmethod
     def read(cls, name: str) -> "Edition":
-        """The edition of that name, or of a file of your own.
+        """The edition of that name, or of your own file.
 
         Raises:
             ScengenError: there is no such file, or it is not an edition.
@@ -190,7 +190,7 @@ class Edition:
         return replace(self, task_versions=task_versions, sets={**self.sets, key: tuple(frozen(pool))})
 
     def other_versions(self, keys: Iterable[str]) -> Iterator[str]:
-        """A line for each task of some sets that was frozen at another version than the installed one.
+        """A line for each task of some sets that was frozen at a different version than the installed one.
 
         Raises:
             UnknownName: there is no such task.
@@ -209,7 +209,7 @@ class Edition:
 
 
 def path_of(name: str) -> Path:
-    """The file of an edition: of that name in conf/editions, or a file of your own, whose name ends with `.yaml`."""
+    """The file of an edition: of that name in conf/editions, or your own file, whose name ends with `.yaml`."""
     return Path(name) if name.endswith(".yaml") else conf_dir() / "editions" / f"{name}.yaml"
 
 
@@ -292,7 +292,7 @@ def check_pool(edition: Edition, pool: Pool) -> str:
         if (a.index, a.id) == (b.index, b.id):
             what = f"the scene of index {a.index}, {a.id}, is another one"
     remedy = (
-        "scengen edition tells whether this version draws something else; if not, move the pool aside to make it "
+        "scengen edition shows whether this version draws something else; if not, move the pool aside to make it "
         "again, or take the pools of the edition's authors: certificates can differ between machines"
     )
     raise PoolError(f"{pool.folder} is not set {key} of edition {edition.name}: {what}; {remedy}")

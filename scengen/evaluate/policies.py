@@ -38,7 +38,7 @@ class Policy(Protocol):
     """The interface of a policy."""
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin an episode; all randomness of the policy in it must come from `seed`."""
+        """Start an episode; all randomness of the policy in it must come from `seed`."""
         ...
 
     def act(self, observation: Observation) -> ArrayLike:
@@ -56,7 +56,7 @@ class Idle:
         self._action = np.resize(IDLE, env.action_space.shape or ())
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin an episode; the policy has no state."""
+        """Start an episode; the policy has no state."""
 
     def act(self, observation: Observation) -> ArrayLike:
         """No motion, grippers open."""
@@ -70,7 +70,7 @@ class Random:
         self._random, self._shape = np.random.default_rng(), env.action_space.shape
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin the random stream of `seed`."""
+        """Start the random stream of `seed`."""
         self._random = np.random.default_rng(seed)
 
     def act(self, observation: Observation) -> ArrayLike:
@@ -87,7 +87,7 @@ class Oracle:
         self.identity = inspect.getsource(env.task.family)
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin the plan anew."""
+        """Start the plan again."""
         self.plan = self.env.scenario.oracle(self.env.world)
         self.filter.reset()
 

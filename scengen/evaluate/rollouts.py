@@ -69,8 +69,8 @@ def evaluate(
     path = settings.folder / "episodes.jsonl"
     if settings.remote and settings.version is None and not settings.fresh and path.exists():
         why = f"{path} holds episodes of an earlier run, and a server does not say which weights it serves"
-        raise BadConfig(f"{why}; say fresh=true to begin anew, or version=NAME from the start to be able to continue")
-    remedy = "say fresh=true to begin anew (old episodes are moved aside), or choose another to="
+        raise BadConfig(f"{why}; pass fresh=true to start again, or version=NAME from the start to be able to continue")
+    remedy = "pass fresh=true to start again (old episodes are moved aside), or choose another to="
     with closing(PolicyPlayer(settings, search)) as player:
         versions = {a["task"]: a["task_version"] for a in about.values()}
         depends = {**_identity(settings, pools), "task_versions": versions, "code": player.identities({*versions})}
@@ -134,7 +134,7 @@ def _scenarios(
         about |= _first_scenarios(pool, settings, search)
     if not about:
         named = ", ".join(sorted({split for pool in pools for split in pool.kinds("split")[0]}))
-        raise BadConfig(f"splits = {settings.splits}; these pools have none of them, but {named}; say splits=all")
+        raise BadConfig(f"splits = {settings.splits}; these pools have none of them, but {named}; pass splits=all")
     rows = (
         row
         for pool in pools
@@ -164,7 +164,7 @@ def _first_scenarios(pool: Pool, settings: EvaluateSettings, search: Sequence[st
     every = [(id_, {**told, "task_version": versions[told["task"]]}) for id_, told in every]
     wanted = [(id_, told) for id_, told in every if _is_wanted(told["task"], told["split"], settings.splits, search)]
     if wanted and len(wanted) < settings.seeds:
-        remedy = f"say seeds={len(wanted)}"
+        remedy = f"pass seeds={len(wanted)}"
         raise BadConfig(f"seeds = {settings.seeds}, but {pool.folder} holds {len(wanted)} scenarios; {remedy}")
     return {(str(pool.folder), id_): told for id_, told in wanted[: settings.seeds]}
 

@@ -60,7 +60,7 @@ class EvaluateSettings:
     def folders(self) -> list[str]:
         """Folders of the pools."""
         if self.pool is None:
-            raise BadConfig("no pool was given; say pool=FOLDER, or edition=NAME, whose pools scengen evaluate makes")
+            raise BadConfig("no pool was given; pass pool=FOLDER, or edition=NAME, whose pools scengen evaluate makes")
         return collection.folders(self.pool)
 
     @property
@@ -114,7 +114,7 @@ class EvaluateSettings:
             raise BadConfig("evaluate needs pool=..., or edition=...; see scengen evaluate --help")
         if self.tasks is not None and (self.edition is None or self.pool is not None):
             raise BadConfig(
-                f"tasks = {cut(str(self.tasks))}; it chooses sets of an edition: say edition=v1 without pool="
+                f"tasks = {cut(str(self.tasks))}; it chooses sets of an edition: pass edition=v1 without pool="
             )
 
     def check(self) -> None:

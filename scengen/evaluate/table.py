@@ -29,7 +29,7 @@ class TableLine:
 def table(episodes: Sequence[Mapping[str, Any]]) -> list[TableLine]:
     """The paper's table: one line for every task and OOD split, for every category, and for all tasks together.
 
-    A scenario counts once, whatever the number of its rollouts. Scenario i of an axis is scenario i of training with
+    A scenario counts once, with any number of rollouts. Scenario i of an axis is scenario i of training with
     the axis moved. If training has at least half of these twins, differences are taken within twins. A line over
     several axes first takes the mean over the axes for each i. Categories are means over their tasks, with equal
     weights on both sides, so that tasks with many axes count no more than others.

@@ -1,7 +1,7 @@
 """Stored behaviour of a task: what it declares and draws, what its rules say, and how rollouts end.
 
 The file `conf/behaviour/<task>.json` says what version N of a task is. As long as a task behaves like its file, every
-figure that was measured on version N stands, whatever was renamed or moved in the code.
+figure that was measured on version N remains valid, also if code was renamed or moved.
 """
 
 import base64
@@ -88,7 +88,7 @@ class Behaviour:
         """The behaviour in a file.
 
         Raises:
-            PoolError: there is none, it is damaged, or it has another format.
+            PoolError: it does not exist, it is damaged, or it has another format.
         """
         if not path.is_file():
             raise PoolError(f"no stored behaviour at {path}; write it with python tools/behaviour.py write {path.stem}")
@@ -98,7 +98,7 @@ class Behaviour:
                 return cls(**plain)
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise PoolError(f"{path} is damaged ({' '.join(str(error).split())[:160]}); restore it") from None
-        raise PoolError(f"{path} has another format than {FORMAT}; install the scengen that wrote it, or restore it")
+        raise PoolError(f"{path} is not of format {FORMAT}; install the scengen that wrote it, or restore it")
 
     def write(self, path: Path) -> None:
         """Write the file: one line for each draw, limit, state and rollout."""
@@ -139,8 +139,8 @@ def declared(task: Task) -> dict[str, Any]:
         "shortcuts": {name: shortcut.to_rest for name, shortcut in task.nominal.shortcuts().items()},
     }
     for p in parameters(task.nominal):
-        told = [p.nominal, p.unit, p.low, p.high, p.period, "hidden" if p.hidden else "seen"]
-        found[f"parameter {p.name}"] = told
+        parts = [p.nominal, p.unit, p.low, p.high, p.period, "hidden" if p.hidden else "seen"]
+        found[f"parameter {p.name}"] = parts
     found |= {f"{ID} {name}": quantiles(dist) for name, dist in sorted(task.training.items())}
     for axis in task.axes.values():
         for name, dist in axis.replace.items():
@@ -163,12 +163,12 @@ def _answer(task: Task) -> list[Any]:
 def _questions(task: str) -> str:
     """Hash of the questions and sub-goals of a task; empty if it has none."""
     path = facts_file(task) if task in known_tasks() else None
-    told = yaml.safe_load(path.read_text()) if path else ""
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12] if path else ""
+    questions = yaml.safe_load(path.read_text()) if path else ""
+    return hashlib.sha256(json.dumps(questions, sort_keys=True).encode()).hexdigest()[:12] if path else ""
 
 
 QUANTILES = (1e-9, 0.25, 0.5, 0.75, 1.0 - 1e-9)
-"""Numbers at which a distribution is asked for its values, so that its class may be written in another way."""
+"""Numbers in [0, 1] at which the quantiles of a distribution are compared, so that its class may be rewritten."""
 
 
 def quantiles(dist: Dist) -> list[float]:
@@ -263,7 +263,7 @@ def unpacked(text: str) -> NDArray[np.float64]:
     return np.frombuffer(zlib.decompress(base64.b85decode(text)), np.float32).astype(np.float64)
 
 
-def asked(stage: Stage, stored: Behaviour) -> dict[str, Any]:
+def current_rules(stage: Stage, stored: Behaviour) -> dict[str, Any]:
     """Entries `answers`, `states` and `limits` of a behaviour as the rules answer now."""
     book, scenario, world = Book(list(stored.answers)), stage.scenario, stage.world
     contacts = [rules.Contact(*each) for each in stored.contacts]
@@ -300,7 +300,7 @@ def explored(stage: Stage, states: Sequence[NDArray[np.float64]]) -> dict[str, A
     """Entries `answers`, `contacts`, `states` and `limits` of a new behaviour."""
     book, scenario, world = Book(), stage.scenario, stage.world
     texts = [packed(state) for state in states]
-    contacts = rules.contacts_asked(scenario, world, [unpacked(text) for text in texts])
+    contacts = rules.contacts_of_rules(scenario, world, [unpacked(text) for text in texts])
     along, described_states, limits = list(rules.coordinates(world)), [], []
     counts: dict[Any, int] = {}
     for number, text in enumerate(texts):
@@ -347,7 +347,7 @@ def _unsteady(flag: bool) -> list[str]:
 
 
 def observe(task: Task, cheats: Mapping[str, Cheat], steady: bool = True) -> Behaviour:
-    """Observe all of a task's behaviour anew, as a file stores it.
+    """Observe all of a task's behaviour again, as a file stores it.
 
     Args:
         cheats: kept cheats of the task by name.
@@ -397,8 +397,8 @@ def oracles(task: Task) -> dict[str, list[Any]]:
 
 def made(task: Task) -> dict[str, Any]:
     """With what a behaviour is observed."""
-    told = {"machine": machine(), "fingerprint": fingerprint(), "versions": versions()}
-    return {**told, "text": source_sha256(task.family)}
+    values = {"machine": machine(), "fingerprint": fingerprint(), "versions": versions()}
+    return {**values, "text": source_sha256(task.family)}
 
 
 @cache
@@ -410,8 +410,8 @@ def machine() -> str:
     mujoco.mj_step(model, data, 300)
     numbers = np.sin(np.arange(1.0, 200.0)).reshape(-1, 1) ** np.arange(1, 20)
     product = np.linalg.solve(numbers.T @ numbers + np.eye(19), np.exp(-np.arange(19.0)))
-    told = [binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()]
-    return hashlib.sha256(data.qpos.tobytes() + product.tobytes() + "".join(told).encode()).hexdigest()[:16]
+    parts = [binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()]
+    return hashlib.sha256(data.qpos.tobytes() + product.tobytes() + "".join(parts).encode()).hexdigest()[:16]
 
 
 TUMBLING = """

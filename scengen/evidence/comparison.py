@@ -14,7 +14,7 @@ from .behaviour import (
     TRAINING_DRAWS,
     Behaviour,
     Cheat,
-    asked,
+    current_rules,
     declared,
     drawn,
     is_core,
@@ -130,7 +130,7 @@ def without_rollouts(task: Task, stored: Behaviour) -> Iterator[Difference]:
     if any(each.kind == "scene" and each.what == f"{ID} 0" for each in found):
         return  # the stored states belong to another scene
     if stage := _stage(task, {}):
-        yield from _rules(task.name, stored, asked(stage, stored))
+        yield from _rules(task.name, stored, current_rules(stage, stored))
 
 
 def _described(task: Task, stored: Behaviour) -> Iterator[Difference]:
@@ -174,10 +174,10 @@ def _mappings(
 def _rules(task: str, stored: Behaviour, now: Mapping[str, Any]) -> Iterator[Difference]:
     """Differences of what the rules say in stored states, and around their limits."""
     for number, (was, here) in enumerate(zip(stored.states, now["states"], strict=True)):
-        told = [[now["answers"][k] for k in each["answers"]] for each in (was, here)]
+        parts = [[now["answers"][k] for k in each["answers"]] for each in (was, here)]
         for part, kind in enumerate(RULES):
             if was["answers"][part] != here["answers"][part]:
-                yield Difference(task, kind, f"state {number}", told[0][part], told[1][part], "version")
+                yield Difference(task, kind, f"state {number}", parts[0][part], parts[1][part], "version")
             for how in ("contacts", "swept", "mixed"):
                 if was[how][part] != here[how][part]:
                     yield Difference(task, kind, f"state {number}, {how}", was[how][part], here[how][part], "version")
@@ -189,10 +189,10 @@ def _rules(task: str, stored: Behaviour, now: Mapping[str, Any]) -> Iterator[Dif
             what = f"numbers around {magnitude:g} along {coordinate} in state {state}"
             yield Difference(task, "events", what, was[5], here[5], "version")
         for part, kind in enumerate(RULES):
-            told = [" / ".join(now["answers"][side[part]] for side in limit[3:5]) for limit in (was, here)]
-            if told[0] != told[1]:
+            parts = [" / ".join(now["answers"][side[part]] for side in limit[3:5]) for limit in (was, here)]
+            if parts[0] != parts[1]:
                 what = f"limit at {magnitude:g} along {coordinate} in state {state}"
-                yield Difference(task, kind, what, told[0], told[1], "version")
+                yield Difference(task, kind, what, parts[0], parts[1], "version")
 
 
 RULES = ("success or failure", "events")

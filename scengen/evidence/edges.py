@@ -14,7 +14,7 @@ from ..samplers.task import Task
 from ..scenario import Scenario
 
 GRID = 12
-"""Number of steps of a way between two parameter values, in each of which a constraint may begin to fail."""
+"""Number of steps of a way between two parameter values, in each of which a constraint may start to fail."""
 MAX_IN_STEP = 3
 """Largest number of limits that are looked for in one step."""
 BISECTIONS = 34
@@ -92,7 +92,7 @@ def edges(task: Task, starts: Sequence[Scenario], seed: int) -> list[Edge]:
 
 
 def reasons(start: Scenario, changed: Mapping[str, Value]) -> Reasons | None:
-    """Reasons of all refutations of a scenario with some parameters changed, whatever comes first.
+    """Reasons of all refutations of a scenario with some parameters changed, in any order.
 
     The kind of error is the last one if parameters are so strange that a later constraint cannot be asked. None if they
     are out of bounds.
@@ -147,8 +147,8 @@ def _along(number: int, start: Scenario, end: Mapping[str, Value], known: Mappin
 
     def at(share: float) -> dict[str, Value]:
         share = min(max(share, 0.0), 1.0)
-        told = {name: begin[name] + share * (value - begin[name]) for name, value in moved.items()}
-        return {name: round(value) if known[name].integer else float(f"{value:.9g}") for name, value in told.items()}
+        entry = {name: begin[name] + share * (value - begin[name]) for name, value in moved.items()}
+        return {name: round(value) if known[name].integer else float(f"{value:.9g}") for name, value in entry.items()}
 
     def ask(share: float) -> Reasons | None:
         return reasons(start, at(share))

@@ -1,4 +1,4 @@
-"""What an episode makes of the answers of a goal and its failure, whatever the task is."""
+"""How an episode combines the answers of a goal and its failure, for any task."""
 
 import hashlib
 import json
@@ -45,8 +45,8 @@ class Scripted(Scenario):
 @cache
 def episodes_sha256() -> str:
     """Hash of the outcomes of all episodes of `PERIODS` answers, under all rules."""
-    told = [_outcome(answers, rules) for rules in RULES for answers in product(ANSWERS, repeat=PERIODS)]
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()[:12]
+    parts = [_outcome(answers, rules) for rules in RULES for answers in product(ANSWERS, repeat=PERIODS)]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
 
 
 def _outcome(answers: tuple[Answer, ...], rules: Rules) -> list[Any]:

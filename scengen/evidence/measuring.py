@@ -13,7 +13,7 @@ from . import ledger
 from .ledger import Evidence, Kind
 
 DRAWS = 6
-"""Number of draws of a split in the hash that tells its scenarios from others. Other distributions differ in each."""
+"""Number of draws of a split in the hash that identifies its scenarios. Other distributions differ in each."""
 SEED = 0
 """Seed of these draws."""
 
@@ -23,8 +23,8 @@ def draws_of(task: Task, split: str) -> str:
 
     A row about a task as a whole has the hash of the training split.
     """
-    told = [each for index in range(DRAWS) for each in _draw(task, split or ID, index)]
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()[:12]
+    parts = [each for index in range(DRAWS) for each in _draw(task, split or ID, index)]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
 
 
 def _draw(task: Task, split: str, index: int) -> Iterator[str]:

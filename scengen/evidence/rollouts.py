@@ -38,8 +38,8 @@ class Watched(World):
 
     observer: Observer | None = None
 
-    def apply(self, filtered: NDArray[np.float32]) -> None:
-        super().apply(filtered)
+    def step_filtered(self, filtered: NDArray[np.float32]) -> None:
+        super().step_filtered(filtered)
         if self.observer is not None:
             self.observer(self)
 
@@ -64,7 +64,7 @@ class Played:
 
 
 OnChange = Callable[[World, str, NDArray[np.float64], str], None]
-"""Function that is told when the rules change their answer."""
+"""Function that is called when the rules change their answer."""
 
 
 @dataclass
@@ -77,7 +77,7 @@ class Trace:
     on_change: OnChange | None = None
     """Called with the world and the new answer, and with the state and the answer of the period before."""
     before: NDArray[np.float64] | None = None
-    """State after the last period, if changes are asked for."""
+    """State after the last period, if changes are requested."""
 
     def __call__(self, world: World) -> None:
         answer = answer_of(self.scenario, world)
@@ -145,8 +145,8 @@ class Stage:
         yield "idle", lambda world: run(scenario, world, _wait, horizon, until_settled=True)
         for name, shortcut in scenario.shortcuts().items():
             for raw in (False, True):
-                told = f"shortcut {name}{', raw' if raw else ''}"
-                yield told, lambda world, s=shortcut, raw=raw: try_shortcut(scenario, world, s, horizon, raw=raw)
+                message = f"shortcut {name}{', raw' if raw else ''}"
+                yield message, lambda world, s=shortcut, raw=raw: try_shortcut(scenario, world, s, horizon, raw=raw)
         for number in range(JITTERED):
             yield f"jitter {number}", lambda world, number=number: self._jittered(world, number)
         if scenario.steps():
@@ -212,13 +212,13 @@ class Stage:
 
 def played(found: Rollout, changes: list[tuple[float, str]]) -> Played:
     """The result of a rollout with the answers of its rules."""
-    told = json.dumps([found.digest, found.outcome, found.reason, found.gave_up, changes])
-    bits = hashlib.sha256(told.encode() + found.actions.tobytes()).hexdigest()[:8]
+    text = json.dumps([found.digest, found.outcome, found.reason, found.gave_up, changes])
+    bits = hashlib.sha256(text.encode() + found.actions.tobytes()).hexdigest()[:8]
     return Played(verdict_of(found), found.seconds, bits)
 
 
 def verdict_of(found: Rollout) -> str:
-    """Outcome of a rollout, and the kind of reason of a failure. Why a plan gave up is no rule of the task."""
+    """Outcome of a rollout, and the kind of reason of a failure. Why a plan gave up is not a rule of the task."""
     return f"failure: {without_numbers(found.reason)}" if found.outcome == "failure" else found.outcome
 
 

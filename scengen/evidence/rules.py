@@ -71,7 +71,7 @@ class Coordinate:
 
     @property
     def line(self) -> tuple[str, str, int]:
-        """The coordinate whatever its direction."""
+        """The coordinate without its direction."""
         return self.kind, self.of, self.axis
 
 
@@ -162,7 +162,7 @@ class Probe:
         done = [f"{name} {whole(world.memory[name])}" for name in world.memory.names if world.memory[name]]
         done += [name for name, value in before.items() if not np.array_equal(getattr(data, name), value)]
         done += [f"jam {arm.number}" for arm in _all_arms(world) if world.loop.jammed(arm.number)]
-        done += [f"told {np.sign(arm.told).astype(int).tolist()}" for arm in world.partners]
+        done += [f"told {np.sign(arm.scripted_action).astype(int).tolist()}" for arm in world.partners]
         return ", ".join(done)
 
     def numbers(self) -> str:
@@ -180,7 +180,7 @@ class Probe:
 
     def _written(self) -> str:
         parts = [getattr(self.world.data, name).ravel() for name in ("userdata", *EFFECTS)]
-        parts += [np.asarray(arm.told) for arm in self.world.partners]
+        parts += [np.asarray(arm.scripted_action) for arm in self.world.partners]
         return " ".join(f"{value:.6g}" if abs(value) > 1e-9 else "0" for part in parts for value in part)
 
 
@@ -237,7 +237,7 @@ def coordinates(world: World) -> Iterator[Coordinate]:
         *(("memory", name, 0) for name in world.memory.names),
         ("time", "", 0),
     ]
-    for kind, of, axis in sorted(axes):  # whatever the order of bodies and memory
+    for kind, of, axis in sorted(axes):  # independent of the order of bodies and memory
         yield from (Coordinate(kind, of, axis, sign) for sign in (1, -1))
 
 
@@ -334,8 +334,8 @@ class Limit:
 
     @property
     def kind(self) -> tuple[Any, ...]:
-        """What changes at the limit, and along which line; with other contacts than those of the state, whatever the
-        body is."""
+        """What changes at the limit, and along which line; with other contacts than those of the state, for any
+        body."""
         place, line = self.place, self.place.coordinate.line
         sides = ({part for answer in side for part in answer.split(", ")} for side in (self.before, self.after))
         return frozenset(set.symmetric_difference(*sides)), *(line if place.contacts == "same" else (line[0],))
@@ -375,7 +375,7 @@ def chosen(start: State, last: Mapping[str, State], first: Mapping[str, State]) 
     return [start, *(known[answer] for answer in order), *others][:MAX_STATES]
 
 
-def contacts_asked(scenario: Scenario, world: World, states: Sequence[NDArray[np.float64]]) -> list[Contact]:
+def contacts_of_rules(scenario: Scenario, world: World, states: Sequence[NDArray[np.float64]]) -> list[Contact]:
     """Questions about contact that the rules ask in some states."""
     recording = RecordingWorld.twin(world)
     for state in states:

@@ -9,7 +9,7 @@
     data/chunk-000/file-000.parquet         rows of many episodes
     videos/<key>/chunk-000/file-000.mp4     their pictures, one frame per row
 
-A video holds many episodes; the frames of an episode begin at its `from_timestamp`. A file ends after the episode in
+A video holds many episodes; the frames of an episode start at its `from_timestamp`. A file ends after the episode in
 which it reaches LeRobot's usual size.
 """
 
@@ -107,7 +107,7 @@ class DatasetWriter:
         cameras: list[str],
         size: tuple[int, int],
     ):
-        """Begin in an empty folder.
+        """Start in an empty folder.
 
         Args:
             features: columns besides `INDEX_FEATURES`.

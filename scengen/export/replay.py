@@ -55,7 +55,7 @@ class DatasetRow:
     actions: Actions
     """Actions that the controller received in the control periods of the row, shape (periods, 7 * arms)."""
     samples: Sequence[Mapping[str, NDArray[np.float32]]]
-    """Streams at the start of each control period of the row; none unless they were asked for."""
+    """Streams at the start of each control period of the row; none unless they were requested."""
     success: bool
     """Whether the goal was reached during the row."""
     done: bool

@@ -63,7 +63,7 @@ class Demonstrations:
     def __init__(
         self, path: Path, streams: Mapping[str, Stream], environment: RobosuiteEnv, arguments: Mapping[str, Any]
     ):
-        """Begin a file.
+        """Start a file.
 
         Args:
             streams: streams to observe, by robosuite's names.

@@ -58,7 +58,7 @@ def recorded_streams(
         known |= privileged(state, task.family, lambda: playing.orientation)
     for name in wanted:
         if name in cameras_of(robot):
-            raise BadConfig(f"observations = {name}; it is a camera: say cameras={name}")
+            raise BadConfig(f"observations = {name}; it is a camera: pass cameras={name}")
         if name not in known:
             raise UnknownName("observation", name, known)
     return Recorded({name: known[name] for name in wanted}, state.ordered, playing)

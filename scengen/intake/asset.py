@@ -205,7 +205,7 @@ class MeshAsset:
 def make_asset(request: IntakeRequest) -> MeshAsset:
     """Read a mesh and make an asset of it: one convex hull if that is near enough, else convex pieces.
 
-    The work is done in a process of its own, as native code may crash on a mesh, or not end.
+    The work is done in a separate process, as native code may crash on a mesh, or not end.
 
     Raises:
         BadConfig, UnknownName: the settings or the file are invalid, or the process crashed or reached a limit.
@@ -222,7 +222,7 @@ def _lost(request: IntakeRequest, reason: str) -> NoReturn:
 
 
 def _make_asset(request: IntakeRequest) -> MeshAsset:
-    """Make an asset, in a process of its own."""
+    """Make an asset, in a separate process."""
     with open(os.devnull, "wb") as null:  # native code that crashes prints lines of its own
         os.dup2(null.fileno(), 1)
         os.dup2(null.fileno(), 2)

@@ -63,7 +63,7 @@ class Surface:
         self._tree = KDTree(self.points)
 
     def distance(self, points: Points) -> NDArray[np.float64]:
-        """Distances from the surface, shape (n,) [m]; slightly too large if the nearest triangle is no candidate."""
+        """Distances from the surface, shape (n,) [m]; slightly too large if the nearest triangle is not a candidate."""
         _, near = self._tree.query(points, NEIGHBOURS)
         triangles = self.mesh.triangles[self._faces[near].ravel()]
         again = np.repeat(points, NEIGHBOURS, axis=0)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..assets.mesh_prop import Points
 
-FLAT = 1e-6
+FLAT_AREA = 1e-6
 """Area that counts as zero, over the square of the extent of a polygon, as coordinates in files are rounded."""
 
 Indices = NDArray[np.int64]
@@ -40,7 +40,7 @@ class Polygons:
         return cls(np.concatenate(parts) if parts else np.zeros(0, np.int64), sizes)
 
     def joined(self, names: Indices) -> Self:
-        """The polygons with other indices of vertices, without corners that repeat the one before.
+        """The polygons with other indices of vertices, without corners that repeat the previous one.
 
         Args:
             names: new index of each vertex.
@@ -89,7 +89,7 @@ def _cut_quadrilaterals(points: Points, corners: Indices) -> Indices:
         p, q, r = np.moveaxis(points[corners[:, way]], 2, 0)
         smallest.append(np.einsum("nki,ni->nk", np.cross(q - p, r - p), normal).min(axis=1) / 2)
     first, second = smallest
-    flat = FLAT * extent**2
+    flat = FLAT_AREA * extent**2
     doubtful = (np.maximum(first, second) < -flat) | (doubled[:, 0] < 2 * flat)
     found = corners[np.arange(len(corners))[:, None, None], ways[(second > first + flat).astype(int)]].reshape(-1, 3)
     for polygon in corners[doubtful]:
@@ -102,9 +102,9 @@ def _cut(points: Points, corners: Indices) -> Indices:
     own = points[corners] - points[corners].mean(axis=0)
     extent = float(np.ptp(own, axis=0).max())
     normal = np.cross(own, np.roll(own, -1, axis=0)).sum(axis=0) / 2
-    flat = FLAT * extent**2
+    flat = FLAT_AREA * extent**2
     if (area := float(np.linalg.norm(normal))) < flat:
-        if np.linalg.svd(own, compute_uv=False)[1] > FLAT**0.5 * extent:
+        if np.linalg.svd(own, compute_uv=False)[1] > FLAT_AREA**0.5 * extent:
             raise CrossesItself
         middle = np.arange(1, len(corners) - 1)  # all corners are on a line
         return np.stack([np.broadcast_to(corners[0], middle.shape), corners[middle], corners[middle + 1]], axis=1)

@@ -44,7 +44,7 @@ class TrainingData:
 
     task: str
     task_version: int | None
-    """Version of the task; None in recordings that do not tell it."""
+    """Version of the task; None in recordings that do not state it."""
     embodiment: str
     rate: int
     """Rows per second, a divisor of 100."""
@@ -97,8 +97,8 @@ class TrainingData:
             else:
                 found.append(_trajectory(recording, episode, columns, hands))
         if len(found) < MIN_EPISODES:
-            told = ", ".join(f"{count} {why}" for why, count in left_out.items() if count) or "no episodes"
-            raise BadConfig(f"{folder}: {len(found)} demonstrations to learn from ({told}); at least {MIN_EPISODES}")
+            text = ", ".join(f"{count} {why}" for why, count in left_out.items() if count) or "no episodes"
+            raise BadConfig(f"{folder}: {len(found)} demonstrations to learn from ({text}); at least {MIN_EPISODES}")
         if demonstrations is not None and demonstrations > len(found):
             raise BadConfig(f"demonstrations = {demonstrations}; {folder} has {len(found)} to learn from")
         found = found[:demonstrations]
@@ -122,25 +122,25 @@ def entry_names(stream: str, names: Sequence[str], shape: Sequence[int]) -> tupl
     return tuple(names) if len(shape) < 2 else tuple(f"{stream}.{i}" for i in range(prod(shape)))
 
 
-def _task(recording: Recording, asked: str | None) -> str:
+def _task(recording: Recording, wanted: str | None) -> str:
     """The task whose demonstrations are read.
 
     Raises:
-        ScengenError: the recording has none of it, or has several tasks and none is asked for.
+        ScengenError: the recording lacks the task, or has several tasks and none is requested.
     """
     tasks = sorted({str(row["scengen/task"]) for row in recording.episodes})
-    if asked is not None and asked not in tasks:
-        raise UnknownName(f"task in {recording.folder}", asked, tasks)
-    if asked is None and len(tasks) > 1:
-        raise BadConfig(f"{recording.folder} holds demonstrations of {' and '.join(tasks)}; say task=...")
-    return asked or tasks[0]
+    if wanted is not None and wanted not in tasks:
+        raise UnknownName(f"task in {recording.folder}", wanted, tasks)
+    if wanted is None and len(tasks) > 1:
+        raise BadConfig(f"{recording.folder} holds demonstrations of {' and '.join(tasks)}; pass task=...")
+    return wanted or tasks[0]
 
 
 def _task_version(recording: Recording, task: str) -> int | None:
-    """The version of the task of which a recording is; None if its episodes do not tell it.
+    """The version of the task of which a recording is; None if its episodes do not state it.
 
     Raises:
-        PoolError: the episodes tell several versions, or something else.
+        PoolError: the episodes state several versions, or something else.
     """
     first, *others = (row.get(TASK_VERSION) for row in recording.episodes if row["scengen/task"] == task)
     if all(other == first for other in others) and (first is None or (isinstance(first, int) and first >= 1)):
@@ -164,7 +164,7 @@ def _columns(recording: Recording, streams: Sequence[str]) -> dict[str, tuple[st
         if stream not in known:
             if stream == NAME:
                 raise BadConfig(
-                    f"{recording.folder} holds no {NAME}: record with environment_state=true, or say observations=[...]"
+                    f"{recording.folder} holds no {NAME}: record with environment_state=true, or set observations=[...]"
                 )
             raise UnknownName("recorded stream", stream, known)
         column, feature = known[stream]

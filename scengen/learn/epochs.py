@@ -52,7 +52,7 @@ class Training:
         """Begin, or continue from a file.
 
         Args:
-            path: file of the weights after the last epoch; its name tells trainings apart.
+            path: file of the weights after the last epoch; its name identifies the training.
             kind: name of the policy.
             hidden: units of the hidden layers.
             members: number of perceptrons.
@@ -95,8 +95,8 @@ class Training:
         self.losses.append((learned, held_out))
         self.seconds += time.process_time() - started
         if self.kind != KNN:
-            told = {"losses": self._all_losses(), "seconds": np.array([self.seconds], np.float32)}
-            write(self.path, arrays_as_bytes({**self.arrays, **told}))
+            values = {"losses": self._all_losses(), "seconds": np.array([self.seconds], np.float32)}
+            write(self.path, arrays_as_bytes({**self.arrays, **values}))
 
     def _all_losses(self) -> NDArray[np.float32]:
         """Losses of all epochs, shape (epochs, 2); -1 for those to come."""
@@ -133,7 +133,7 @@ class Training:
         }
         network = MLPRegressor(**options)
         with threadpool_limits(1), warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)  # one pass is what was asked for
+            warnings.simplefilter("ignore", ConvergenceWarning)  # one pass is what was requested
             if self.arrays:
                 network.partial_fit(inputs[:BATCH], chunks[:BATCH])  # makes the arrays that are replaced now
                 network.coefs_ = [self.arrays[f"weights{i}"][member].copy() for i in range(len(self.hidden) + 1)]

@@ -72,7 +72,7 @@ class Features:
 
 @cache
 def _quaternions(entries: tuple[str, ...]) -> list[int]:
-    """Places at which a quaternion begins."""
+    """Places at which a quaternion starts."""
     names = [name.rpartition(".") for name in entries]
     return [
         i

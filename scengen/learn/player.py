@@ -29,7 +29,7 @@ class TrainedPolicy:
         self._places = _places(stored, env)
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin an episode without earlier observations."""
+        """Start an episode without earlier observations."""
         self._seen: list[NDArray[np.float32]] = []
         self._planned: list[NDArray[np.float32]] = []
 
@@ -64,7 +64,7 @@ def _check(stored: StoredPolicy, env: PoolEnv) -> None:
     missing = [name for name in own.observed if name not in env.streams]
     if missing:
         raise BadConfig(
-            f"the policy observes {missing[0]}, the environment does not; say observations=[...,{missing[0]}]"
+            f"the policy observes {missing[0]}, the environment does not; pass observations=[...,{missing[0]}]"
         )
     if env.action_repeat != own.action_repeat:
         raise BadConfig(

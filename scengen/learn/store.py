@@ -67,7 +67,7 @@ class PolicySettings:
     """Name of the policy, one of `models.KINDS`."""
     task: str
     task_version: int | None
-    """Version of the task; None if the recording did not tell it."""
+    """Version of the task; None if the recording did not state it."""
     embodiment: str
     rate: int
     """Actions per second, a divisor of 100."""
@@ -169,7 +169,7 @@ class StoredPolicy:
         """Read a policy.
 
         Raises:
-            PoolError: there is none, it is damaged, or of another format.
+            PoolError: it does not exist, it is damaged, or of another format.
         """
         settings = read_settings(folder)
         path = Path(folder, WEIGHTS)
@@ -178,7 +178,7 @@ class StoredPolicy:
                 raise Broken(f"its sha256 is not that in {SETTINGS}")
             arrays = read_arrays(path, settings.shapes)
         except (OSError, ValueError) as error:
-            raise PoolError(f"{path} is damaged ({_told(error)}); restore it, or train the policy again") from None
+            raise PoolError(f"{path} is damaged ({_cause(error)}); restore it, or train the policy again") from None
         return cls(settings, arrays)
 
     @cached_property
@@ -192,8 +192,8 @@ class StoredPolicy:
         content = arrays_as_bytes(self.arrays)
         settings = replace(self.settings, weights_sha256=sha256(content))
         write(folder / WEIGHTS, content)
-        told = {name: value for name, value in asdict(settings).items() if value is not None}
-        write(folder / SETTINGS, json.dumps({"format": FORMAT, **told}, indent=1, sort_keys=True) + "\n")
+        values = {name: value for name, value in asdict(settings).items() if value is not None}
+        write(folder / SETTINGS, json.dumps({"format": FORMAT, **values}, indent=1, sort_keys=True) + "\n")
         return settings
 
 
@@ -206,7 +206,7 @@ def read_settings(folder: str | Path) -> PolicySettings:
     """The settings of the policy in a folder.
 
     Raises:
-        PoolError: there is none, it is damaged, or of another format.
+        PoolError: it does not exist, it is damaged, or of another format.
     """
     path = Path(folder, SETTINGS)
     if not path.is_file():
@@ -220,7 +220,7 @@ def read_settings(folder: str | Path) -> PolicySettings:
             settings.check()
             return settings
     except (ScengenError, ValueError, OSError) as error:
-        raise PoolError(f"{path} is damaged ({_told(error)}); restore it, or train the policy again") from None
+        raise PoolError(f"{path} is damaged ({_cause(error)}); restore it, or train the policy again") from None
     raise BadConfig(f"{path} has format {cut(repr(version), 20)}, this scengen reads {FORMAT}; train the policy again")
 
 
@@ -252,13 +252,13 @@ def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, 
     """Arrays of known shapes. The shape in a header is compared before memory is taken for it.
 
     Raises:
-        Broken: an array is missing, or another one than expected, or the file is no archive.
+        Broken: an array is missing, or another one than expected, or the file is not an archive.
     """
     try:
         with zipfile.ZipFile(path) as archive:
             found = _members(archive, shapes)
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
-        raise Broken(_told(error)) from None
+        raise Broken(_cause(error)) from None
     for name, array in found.items():
         if not (np.isfinite(array).all() or (name == "input_scale" and (array > 0).all())):
             raise Broken(f"{name} has numbers that are not finite")
@@ -276,9 +276,11 @@ def _members(archive: zipfile.ZipFile, shapes: Mapping[str, tuple[int, ...]]) ->
         with archive.open(entry) as member:
             if np.lib.format.read_magic(member) != (1, 0):
                 raise Broken(f"{name} has another version of the header")
-            told = np.lib.format.read_array_header_1_0(member)
-            if told != (shape, False, np.dtype(np.float32)):
-                raise Broken(f"{name} has the shape {cut(str(told[0]))} and the type {told[2]}, not {shape}, float32")
+            header = np.lib.format.read_array_header_1_0(member)
+            if header != (shape, False, np.dtype(np.float32)):
+                raise Broken(
+                    f"{name} has the shape {cut(str(header[0]))} and the type {header[2]}, not {shape}, float32"
+                )
             content = member.read(4 * prod(shape))
             if len(content) < 4 * prod(shape):
                 raise Broken(f"{name} ends early")
@@ -286,5 +288,5 @@ def _members(archive: zipfile.ZipFile, shapes: Mapping[str, tuple[int, ...]]) ->
     return found
 
 
-def _told(error: Exception) -> str:
+def _cause(error: Exception) -> str:
     return cut(" ".join(str(error).split()), 160)

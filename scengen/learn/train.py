@@ -112,7 +112,7 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
         try:
             run = Training(path, settings.policy, hidden, members, samples, validation, epochs, limit, settings.seed)
         except (Broken, ValueError, OSError) as error:
-            raise BadConfig(f"{path} is damaged ({cut(str(error))}); delete it to begin anew") from None
+            raise BadConfig(f"{path} is damaged ({cut(str(error))}); delete it to start again") from None
         earlier = len(run.losses)
         while run.share < 1.0:
             run.advance()
@@ -153,8 +153,8 @@ def _identity(settings: TrainSettings, data: TrainingData) -> str:
     """Hash of everything that decides the weights."""
     chosen = {name: value for name, value in asdict(settings).items() if name not in GIVEN_BY_DATA}
     versions = {"format": FORMAT, "version": _version("scengen")}
-    told = {**chosen, "sha256": data.sha256, "task_version": data.task_version, "streams": data.streams, **versions}
-    return sha256(json.dumps(told, sort_keys=True))
+    values = {**chosen, "sha256": data.sha256, "task_version": data.task_version, "streams": data.streams, **versions}
+    return sha256(json.dumps(values, sort_keys=True))
 
 
 @contextmanager

@@ -20,7 +20,7 @@ FORMAT = 3
 """Format of `card.json`. A card without a number is of format 1, which lacks the planners with beliefs of training and
 whose verdict names a memory alone; one of format 2 lacks `nearest_belief`."""
 NOT_SEARCHED = "boundaries were not searched for (rounds=0)"
-"""Reason why a card has no boundaries if none were asked for."""
+"""Reason why a card has no boundaries if none were requested."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class AxisCard:
     reasons: Mapping[str, int]
     """Number of rejected draws by reason."""
     indices: int
-    """Number of indices that were tried for the certified scenarios; 0 if none was asked for."""
+    """Number of indices that were tried for the certified scenarios; 0 if none was requested."""
     first_draws: int
     """Number of indices whose first draw was certified."""
     verdict: str
@@ -96,12 +96,12 @@ class AxisCard:
 
     def plain(self) -> dict[str, Any]:
         """The card as plain data, for JSON."""
-        told = {"format": FORMAT, **asdict(self)}
-        told["baselines"] = [{**asdict(baseline), "finding": baseline.finding} for baseline in self.baselines]
-        told["boundaries"] = {
+        values = {"format": FORMAT, **asdict(self)}
+        values["baselines"] = [{**asdict(baseline), "finding": baseline.finding} for baseline in self.baselines]
+        values["boundaries"] = {
             k: {**asdict(b), "verdict": b.verdict, "told": str(b)} for k, b in self.boundaries.items()
         }
-        return told
+        return values
 
 
 def read_card(path: Path) -> dict[str, Any]:

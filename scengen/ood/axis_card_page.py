@@ -84,7 +84,7 @@ def _strips(task: Task, row: PoolRow) -> list[tuple[str, str]]:
 
 
 def _supports_figure(task: Task, card: AxisCard) -> Figure:
-    """The supports of every moved parameter in training and on the axis, each in a plot of its own."""
+    """The supports of every moved parameter in training and on the axis, each in a separate plot."""
     shifts = task.axes[card.axis].replace
     figure = Figure(figsize=(7.5, 0.5 + 0.55 * len(shifts)))
     axes = figure.subplots(len(shifts), 1, squeeze=False)[:, 0]

@@ -129,7 +129,7 @@ def _boundaries(
     if reason := boundary.why_no_path(task, axis) or ("" if settings.rounds else NOT_SEARCHED):
         return {}, reason
 
-    def told(done: int, total: int) -> None:
+    def report(done: int, total: int) -> None:
         progress("search boundaries", done, total)
 
-    return boundary.search(task, settings.axis, folder, settings.seed, settings.rounds, told), ""
+    return boundary.search(task, settings.axis, folder, settings.seed, settings.rounds, report), ""

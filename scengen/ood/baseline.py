@@ -79,12 +79,12 @@ class Baseline:
     @property
     def record(self) -> dict[str, Any]:
         """The counts from which `of_record` computes the baseline again."""
-        told = {"name": self.name, "control": self.control, "own": round(self.own, 4)}
+        values = {"name": self.name, "control": self.control, "own": round(self.own, 4)}
         if not (self.training and self.here and self.excess):
-            return {**told, **dict.fromkeys(COUNTS, 0)}
+            return {**values, **dict.fromkeys(COUNTS, 0)}
         n = self.excess.twins
         counts = (n, round(self.training.value * n), round(self.here.value * n), self.both)
-        return {**told, **dict(zip(COUNTS, counts, strict=True))}
+        return {**values, **dict(zip(COUNTS, counts, strict=True))}
 
     @classmethod
     def of_record(cls, record: Mapping[str, Any]) -> Self:
@@ -97,7 +97,9 @@ class Baseline:
             n, training, here, both = (int(record[name]) for name in COUNTS)
             name, control, own = str(record["name"]), str(record["control"]), float(record["own"])
         except (KeyError, TypeError, ValueError):
-            raise BadConfig(f"{dict(record)} is no record of a baseline; it needs name, control, own, counts") from None
+            raise BadConfig(
+                f"{dict(record)} is not a record of a baseline; it needs name, control, own, counts"
+            ) from None
         arms = {
             (True, True): both,
             (True, False): training - both,

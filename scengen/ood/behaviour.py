@@ -89,8 +89,8 @@ def measure(
             if library:
                 _library(task, seed)
 
-        told = partial(progress, what)
-        return play_indices(partial(work, task, which, seed), task, which, where, count, trials, told, prepare)
+        report = partial(progress, what)
+        return play_indices(partial(work, task, which, seed), task, which, where, count, trials, report, prepare)
 
     own = play(_play_own, controls / "own.jsonl", ID, n, "memories in training", False)
     any_id = play(_play_library, controls / "any.jsonl", ID, any_n, "any memory in training", True)

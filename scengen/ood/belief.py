@@ -81,10 +81,10 @@ def believed(task: Task, split: str, scenario: Scenario, trained: Scenario) -> d
     known, seen = values(trained), values(scenario)
     moved = set(task.shifts(split))
     hidden = _hidden(task, split)
-    told: dict[str, dict[str, Value]] = {"hidden_belief": {name: known[name] for name in hidden}} if hidden else {}
-    told["belief"] = {name: known[name] for name in moved}
-    told["nearest_belief"] = {name: _nearest(task, name, seen[name]) for name in moved}
-    return {name: with_values(scenario, wrong) for name, wrong in told.items()}
+    beliefs: dict[str, dict[str, Value]] = {"hidden_belief": {name: known[name] for name in hidden}} if hidden else {}
+    beliefs["belief"] = {name: known[name] for name in moved}
+    beliefs["nearest_belief"] = {name: _nearest(task, name, seen[name]) for name in moved}
+    return {name: with_values(scenario, wrong) for name, wrong in beliefs.items()}
 
 
 def _nearest(task: Task, name: str, value: Value) -> Value:
@@ -108,10 +108,10 @@ def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
     for arm, scenario in (("control", control), ("here", here)):
         planners = believed(task, split, scenario, trained)
         why = {planner: _play(task, scenario, planner) for planner in set(planners.values())}  # some agree
-        told = {name: why[planner] for name, planner in planners.items()}
-        record[arm] = {name: reason is None for name, reason in told.items()}
+        failures = {name: why[planner] for name, planner in planners.items()}
+        record[arm] = {name: reason is None for name, reason in failures.items()}
         if arm == "here":
-            record["reasons"] = {name: reason for name, reason in told.items() if reason}
+            record["reasons"] = {name: reason for name, reason in failures.items() if reason}
     return record
 
 

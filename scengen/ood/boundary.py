@@ -2,7 +2,7 @@
 
 A point on the path of an axis is a fraction: 0 is the edge of training, 1 the axis' far end. Beyond 1 the path goes on
 to the bounds of the parameters, or to where it would come nearer to training again. Twin i is scenario i of training
-with the axis' parameters put at that point. Every trial has a twin of its own.
+with the axis' parameters put at that point. Every trial has its own twin.
 
 The boundary is the first point at which half of the twins or fewer are solved. The first looks are fixed: at both ends
 and at places along the whole path, so that a hole of a tenth of the axis is seen. The other looks go to where the
@@ -113,26 +113,26 @@ class Boundary:
         """The boundary in a sentence, in shares of the way from the edge of training to the far end of the axis."""
         way = "of the way from the edge of training to the far end of the axis"
         high = self.end if self.high is None else self.high
-        told = {
+        text = {
             HOLDS: f"holds to the end of the path, {self.end:.0%} {way} ({self.at_end})",
             OPEN: f"holds for {self.low:.0%} {way}, perhaps to the end of the path at {self.end:.0%} ({self.at_end})",
             FAILS: f"fails first at {self.middle:.0%} {way}, 95 % interval {self.low:.0%} to {high:.0%}",
             FAILS_AT_ONCE: f"fails at the edge of training ({self.at_edge})",
         }[self.verdict]
-        return told + (f"; holds again from {self.again[0]:.0%} to {self.again[1]:.0%}" if self.again else "")
+        return text + (f"; holds again from {self.again[0]:.0%} to {self.again[1]:.0%}" if self.again else "")
 
     def __str__(self) -> str:
         """The boundary in short, in fractions of the path."""
         at_end = f"{self.at_end}, at least {self.at_end.least:.2f} at 95 %"
         at_edge = f"{self.at_edge}, at most {self.at_edge.most:.2f} at 95 %"
         high = self.end if self.high is None else self.high
-        told = {
+        text = {
             HOLDS: f"> {self.end:.2f} ({at_end})",
             OPEN: f"> {self.low:.2f}, perhaps > {self.end:.2f} ({at_end})",
             FAILS: f"{self.middle:.2f} [{self.low:.2f}, {high:.2f}]",
             FAILS_AT_ONCE: f"< 0 ({at_edge})",
         }[self.verdict]
-        return told + (f", holds again from {self.again[0]:.2f} to {self.again[1]:.2f}" if self.again else "")
+        return text + (f", holds again from {self.again[0]:.2f} to {self.again[1]:.2f}" if self.again else "")
 
 
 def search(

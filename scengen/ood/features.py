@@ -122,7 +122,7 @@ def unseen(draws: int) -> float:
 def _twins(task: Task, split: str, draws: int, seed: int) -> list[tuple[Scenario, Scenario]]:
     found = []
     for index in range(draws):
-        with suppress(Infeasible):  # an infeasible index is no scenario; it is counted where scenarios are generated
+        with suppress(Infeasible):  # an infeasible index is not a scenario; it is counted where scenarios are generated
             *_, last = task.proposals(split, seed, index)
             if last.refutation is None:
                 found.append((last.trained or last.scenario, last.scenario))

@@ -6,8 +6,8 @@ less from there on. The looks nearest to the point are counted on either side, 6
 point is refuted if, at a chance of one half, as many failures before it, or as many successes beyond it, occur in at
 most 2.5 % of cases (sign tests). The interval reaches from the first to the last point that remains.
 
-* Failures refute every point beyond them, whatever the curve. If success has returned, the nearest looks do not show
-  it. There the failures of a hole count, corrected for as many tests as there are stretches to look for them.
+* Failures refute every point beyond them, for any shape of the curve. If success has returned, the nearest looks do not
+  show it. There the failures of a hole count, corrected for as many tests as there are stretches to look for them.
 * Successes refute the points before them only if success has not returned after a fall. So no count reaches across a
   hole: two failures in a row. A hole without any look in it is not seen.
 

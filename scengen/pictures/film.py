@@ -157,7 +157,7 @@ def movie(
         UnknownName: there is no such camera.
         BadConfig: the file cannot be written.
     """
-    periods_between(fps)  # before a file is begun
+    periods_between(fps)  # before a file is started
     with (
         closing(Camera(take.world(), width, height)) as eye,
         appearing(path, folder=False) as part,

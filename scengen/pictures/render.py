@@ -47,7 +47,7 @@ class Camera:
     """A renderer for one world. Any thread may take pictures."""
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError("a Camera holds a context of OpenGL and cannot be copied or pickled; make Camera(world) anew")
+        raise TypeError("a Camera holds a context of OpenGL and cannot be copied or pickled; make a new Camera(world)")
 
     def __init__(self, world: World, width: int = 320, height: int = 240, view: MjvCamera | None = None):
         """Start with a view, by default the fitted one of the scene from the direction that hides least of it.
@@ -55,7 +55,7 @@ class Camera:
         Args:
             width: width of the pictures [pixels], at most `opengl.LARGEST_EDGE`.
             height: height of the pictures [pixels], likewise.
-            view: such as that of `fitted` or of `twins.telling`.
+            view: such as that of `fitted` or of `twins.comparison_view`.
 
         Raises:
             BadConfig: pictures cannot have this size.

@@ -53,7 +53,7 @@ def pair(row: SceneRow, twin_scene: str, directions: Directions) -> tuple[str, s
     check_scene(row.scene_xml, row.embodiment)
     check_pictures()  # before the meshes of the robots, which take a part of the address space
     worlds = World.load(twin_scene, row.embodiment, visual=True), stored_world(row, visual=True)
-    view = telling(worlds, PICTURE[0] / PICTURE[1], directions)
+    view = comparison_view(worlds, PICTURE[0] / PICTURE[1], directions)
     twin, here = (address(encode(each), "webp") for each in twin_pictures(*worlds, size=PICTURE, view=view))
     return twin, here, [(view.azimuth, view.elevation)]
 
@@ -75,7 +75,7 @@ def twin_pictures(*worlds: World, size: tuple[int, int], view: MjvCamera) -> lis
     return pictures
 
 
-def telling(worlds: Sequence[World], aspect: float, directions: Directions = DIRECTIONS) -> MjvCamera:
+def comparison_view(worlds: Sequence[World], aspect: float, directions: Directions = DIRECTIONS) -> MjvCamera:
     """The view that contains the things of all worlds and shows best in what the last one differs from the first.
 
     Args:

@@ -31,7 +31,7 @@ class Movie:
     """An MP4 file that is being written. Frame k starts exactly at k / fps."""
 
     def __init__(self, path: Path, fps: int, width: int, height: int, key_every: int = 250):
-        """Begin a file.
+        """Start a file.
 
         Args:
             key_every: number of frames per keyframe. With few frames per keyframe, single frames can be read quickly.

@@ -47,8 +47,8 @@ def members(folder: str | Path) -> list[str]:
     named = _read_index(folder)
     for name, sha256 in named.items():
         if Pool.open(folder / name).sha256 != sha256:
-            told = f"{folder / name} has another hash than {folder / INDEX} says"
-            raise PoolError(f"{told}; restore it, or name the pools themselves: pool={folder / name},...")
+            message = f"{folder / name} has a different hash than {folder / INDEX} says"
+            raise PoolError(f"{message}; restore it, or name the pools themselves: pool={folder / name},...")
     return [str(folder / name) for name in named]
 
 

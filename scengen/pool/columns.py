@@ -160,8 +160,8 @@ def witness(name: str, value: Any) -> np.ndarray:
 def check_robot(embodiment: str, witness: np.ndarray) -> None:
     """Raise `Malformed` unless a witness consists of actions of the robot."""
     size = action_size(embodiment)
-    told = f"a witness with {witness.shape[1]} numbers in an action; those of {embodiment} have {size}"
-    demand(witness.shape[1] == size, told)
+    message = f"a witness with {witness.shape[1]} numbers in an action; those of {embodiment} have {size}"
+    demand(witness.shape[1] == size, message)
 
 
 # --- from a field to what is stored -----------------------------------------------------------------------------------

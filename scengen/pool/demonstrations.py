@@ -82,7 +82,7 @@ class DemonstrationManifest:
 
     config: DemonstrationConfig
     n: int
-    """Number of demonstrations that were asked for."""
+    """Number of demonstrations that were requested."""
     indices: int
     """Number of attempts: of indices, times the runs of each. Runs that a person did not need are counted, too."""
     funnel: Mapping[str, int]
@@ -115,12 +115,12 @@ class DemonstrationManifest:
         """The manifest of a folder.
 
         Raises:
-            PoolError: there is none, it is damaged, or it is of another format.
+            PoolError: it does not exist, it is damaged, or it is of another format.
         """
         path = folder / DEMONSTRATIONS
         if not path.is_file():
             begun = Path(f"{folder}.run").is_dir()
-            hint = "a run was begun there; repeat its command to finish it" if begun else "see scengen demos"
+            hint = "a run was started there; repeat its command to finish it" if begun else "see scengen demos"
             raise PoolError(f"no demonstrations at {folder}: {DEMONSTRATIONS} is missing; {hint}")
         try:
             plain = dict(check_mapping("the manifest", read_json_file(path)))
@@ -132,8 +132,10 @@ class DemonstrationManifest:
         except (ScengenError, ValueError, KeyError, TypeError, OSError) as error:
             why = " ".join(str(error).split())[:160]
             raise PoolError(f"{path} is damaged; restore it or make the demonstrations again ({why})") from None
-        told = f"{folder} has format {str(version)[:20]} of demonstrations, this scengen reads {DEMONSTRATIONS_FORMAT}"
-        raise PoolError(f"{told}; make them again with the command that made them")
+        message = (
+            f"{folder} has format {str(version)[:20]} of demonstrations, this scengen reads {DEMONSTRATIONS_FORMAT}"
+        )
+        raise PoolError(f"{message}; make them again with the command that made them")
 
     def write(self, folder: Path) -> None:
         """Write the manifest of a folder."""
@@ -167,7 +169,7 @@ def _check(manifest: DemonstrationManifest) -> None:
     demand(0 < len(config.styles) <= 100, f"config.styles has {len(config.styles)} entries")
     for style in config.styles:
         check_match("config.styles", style, WORD)
-    demand(config.keep in ((), ("failed",)), "config.keep names something else than failed")
+    demand(config.keep in ((), ("failed",)), "config.keep names something other than failed")
     demand(len(config.apart) <= MAX_SHARDS, f"config.apart has {len(config.apart)} entries")
     for pool in config.apart:
         check_match("config.apart", pool, HASH)
@@ -182,11 +184,11 @@ def _check(manifest: DemonstrationManifest) -> None:
     if manifest.policy is not None:
         check_text("policy", manifest.policy, MAX_TEXT)
     demand(manifest.operator is None or manifest.policy is None, "an operator and a policy")
-    for source, told in ((TELEOP, manifest.operator), (POLICY, manifest.policy)):
-        demand((told is None) == (source not in config.styles), f"style {source} and its source go together")
+    for source, stated in ((TELEOP, manifest.operator), (POLICY, manifest.policy)):
+        demand((stated is None) == (source not in config.styles), f"style {source} and its source go together")
         demand(source not in config.styles or len(config.styles) == 1, f"{source} stands beside other styles")
     if manifest.failed is not None:
-        demand(manifest.failed.file == FAILED, f"failed names another file than {FAILED}")
+        demand(manifest.failed.file == FAILED, f"failed names a different file than {FAILED}")
     check_text("config.split", config.split, MAX_TEXT)
 
 

@@ -76,7 +76,7 @@ def why_damaged(folder: Path, entry: FileEntry, identities: dict[Path, Identity]
             if identity.size != entry.bytes:
                 return f"has {identity.size} bytes instead of {entry.bytes}: truncated"
             if sha256_of_opened(file) != entry.sha256:
-                return "has another sha256 than the manifest says"
+                return "has a different sha256 than the manifest says"
     except (OSError, ValueError) as error:
         return str(error).removeprefix("it ")
     return "has been changed since its sha256 was compared" if identities.setdefault(path, identity) != identity else ""

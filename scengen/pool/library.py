@@ -67,8 +67,8 @@ class Library(Sequence[AnyRow], Generic[AnyRow]):
         """Number of the scenario of a name, an id, or a unique prefix of an id, see `StoredRows.row`.
 
         Raises:
-            UnknownName: there is none.
-            BadConfig: several ids begin with the text.
+            UnknownName: it does not exist.
+            BadConfig: several ids start with the text.
         """
         return self.directory.find(text, self.name, "these pools")
 
@@ -76,7 +76,7 @@ class Library(Sequence[AnyRow], Generic[AnyRow]):
         """The scenarios of one split.
 
         Raises:
-            UnknownName: there are none.
+            UnknownName: they do not exist.
         """
         if split not in (known := self.kinds("split")):
             raise UnknownName("split in these pools", split, known)

@@ -72,7 +72,7 @@ class Manifest:
 
     config: RunConfig
     n: int
-    """Number of scenarios that were asked for."""
+    """Number of scenarios that were requested."""
     indices: int
     """Number of indices that were tried."""
     first_draws: int
@@ -115,12 +115,12 @@ class Manifest:
         """The manifest of a folder.
 
         Raises:
-            PoolError: there is none, it is damaged, or it is of another format.
+            PoolError: it does not exist, it is damaged, or it is of another format.
         """
         path = folder / MANIFEST
         if not path.is_file():
             begun = Path(f"{folder}.run").is_dir()
-            hint = "a run was begun there; repeat its command to finish it" if begun else "see scengen generate"
+            hint = "a run was started there; repeat its command to finish it" if begun else "see scengen generate"
             raise PoolError(f"no pool at {folder}: {MANIFEST} is missing; {hint}")
         try:
             plain = read_json_file(path)
@@ -132,8 +132,8 @@ class Manifest:
             raise PoolError(f"{path} is damaged; restore it or generate the pool again ({why})") from None
         newer = isinstance(version, int) and version > FORMAT
         remedy = "install a newer scengen" if newer else "generate it again with the command and seed that made it"
-        told = f"{folder} has pool format {str(version)[:20]}, this scengen reads {FORMAT}"
-        raise PoolError(f"{told}; {remedy} (docs/pools.md, Formats)")
+        message = f"{folder} has pool format {str(version)[:20]}, this scengen reads {FORMAT}"
+        raise PoolError(f"{message}; {remedy} (docs/pools.md, Formats)")
 
     def plain(self) -> dict[str, Any]:
         """Plain data, as a pool stores it."""
@@ -206,7 +206,7 @@ def _check(manifest: Manifest) -> None:
         check_entry(entry)
     demand(len({entry.file for entry in manifest.shards}) == len(manifest.shards), "a shard is listed twice")
     if manifest.rejected is not None:
-        demand(manifest.rejected.file == REJECTED, f"rejected names another file than {REJECTED}")
+        demand(manifest.rejected.file == REJECTED, f"rejected names a different file than {REJECTED}")
     if manifest.attack is not None:
         _check_attack(manifest.attack)
     if manifest.subset is not None:
@@ -237,7 +237,7 @@ def _check_config(config: RunConfig) -> None:
     check_text("config.certify.name", config.certify.get("name"), 100)
     check_settling(config.certify.get("settle"))
     for verdict in config.keep:
-        demand(verdict in ("refuted", "unknown"), "config.keep names another verdict than refuted and unknown")
+        demand(verdict in ("refuted", "unknown"), "config.keep names a different verdict than refuted and unknown")
 
 
 def check_draws(task: Mapping[str, Any], split: str, sampler: str, seed: int) -> None:

@@ -20,7 +20,7 @@ class Misnamed(UserWarning):
 
 
 class NoScenario(UnknownName):
-    """No id begins with the given text."""
+    """No id starts with the given text."""
 
     def __init__(self, text: str, close: str, known: str, where: str):
         ScengenError.__init__(self, f"no scenario in {where} named {cut(repr(text))}{close}; known: {known}")
@@ -64,7 +64,7 @@ def find(text: str, known: Known, name: Callable[[int], Name], where: str) -> in
         where: description of `known`, for errors.
 
     Raises:
-        NoScenario: there is none.
+        NoScenario: it does not exist.
         BadConfig: there is more than one.
     """
     before, _, start = text.rpartition("/")
@@ -72,11 +72,11 @@ def find(text: str, known: Known, name: Callable[[int], Name], where: str) -> in
     if not found:
         raise NoScenario(text, nearest(start, known.alike(start)), _listed(range(len(known)), name), where)
     if len(found) > 1:
-        told = f"{cut(repr(text))} begins {len(found)} ids in {where}; give more characters: {_listed(found, name)}"
-        raise BadConfig(told)
+        message = f"{cut(repr(text))} starts {len(found)} ids in {where}; give more characters: {_listed(found, name)}"
+        raise BadConfig(message)
     if before and not str(called := name(found[0])).startswith(f"{before}/"):
-        told = f"{cut(text)} is {called}: the id counts, the text before it is wrong"
-        warnings.warn(told, Misnamed, stacklevel=3)
+        message = f"{cut(text)} is {called}: the id counts, the text before it is wrong"
+        warnings.warn(message, Misnamed, stacklevel=3)
     return found[0]
 
 

@@ -51,7 +51,7 @@ class Pool(StoredRows[Manifest, PoolRow]):
         """The scenario that was drawn at an index.
 
         Raises:
-            PoolError: there is none; the other indices were not certified.
+            PoolError: it does not exist; the other indices were not certified.
         """
         place = self.directory.of_index(index)
         if place is None:

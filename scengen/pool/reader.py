@@ -55,7 +55,7 @@ class Reader:
         """Ids and indices of all rows.
 
         Raises:
-            PoolError: a file cannot be read, or holds another number of rows than `files` says.
+            PoolError: a file cannot be read, or holds a different number of rows than `files` says.
         """
         return joined([Directory(*shards.read_keys(shard)) for shard in self.files])
 

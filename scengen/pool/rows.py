@@ -123,7 +123,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         Raises:
             PoolError: a file cannot be read.
         """
-        return (Name(*told) for told in self.columns("task", "split", "index", "id"))
+        return (Name(*values) for values in self.columns("task", "split", "index", "id"))
 
     def kinds(self, name: str) -> tuple[list[str], NDArray[np.int32]]:
         """The different texts in a column such as `split`, and which of them each row has, shape (n,).
@@ -138,7 +138,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         """Ids and indices of the scenarios of all rows, read once.
 
         Raises:
-            PoolError: a file cannot be read, or holds another number of rows than the manifest says.
+            PoolError: a file cannot be read, or holds a different number of rows than the manifest says.
         """
         if len(self) > MAX_ROWS:
             raise PoolError(f"{self.folder} promises {len(self)} scenarios; at most {MAX_ROWS} are found by their ids")
@@ -161,7 +161,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         """The row at a place, counted from 0 in their order.
 
         Raises:
-            IndexError: there is none.
+            IndexError: it does not exist.
             PoolError: its file cannot be read.
         """
         if not 0 <= place < len(self):
@@ -179,7 +179,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         The id counts; a warning reports a name that contradicts it (`names.Misnamed`).
 
         Raises:
-            UnknownName: there is none.
+            UnknownName: it does not exist.
             BadConfig: there is more than one.
         """
         return self.at(self.directory.find(name, self.name_at, str(self.folder)))

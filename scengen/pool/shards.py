@@ -55,10 +55,10 @@ def read_rows(shard: Shard, names: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Some columns of all rows, one by one, as the values of `PoolRow`'s fields.
 
     Raises:
-        PoolError: the file cannot be read, holds something else than a pool of this format, or another number of rows.
+        PoolError: the file cannot be read, holds something other than a pool of this format, or another number of rows.
     """
     count = 0
-    with _faults_told(shard, lambda: f"from row {count} on"), opened(shard) as file:
+    with _reported_faults(shard, lambda: f"from row {count} on"), opened(shard) as file:
         check_groups(file.metadata, range(file.num_row_groups))
         for batch in _batches(file, names, BATCH_ROWS):
             for values in _values(batch, shard.layout):
@@ -81,7 +81,7 @@ def read_rows_at(
     Raises:
         PoolError: as `read_rows`.
     """
-    with _faults_told(shard, lambda: f"in group {group} of its rows"), opened(shard, metadata) as file:
+    with _reported_faults(shard, lambda: f"in group {group} of its rows"), opened(shard, metadata) as file:
         check_groups(metadata, [group])
         wanted, start = iter(places), 0
         place = next(wanted, None)
@@ -162,7 +162,7 @@ def _small_columns(shard: Shard, names: Sequence[str]) -> Iterator[pa.RecordBatc
         PoolError: as `read_rows`.
     """
     count = 0
-    with _faults_told(shard, lambda: f"from row {count} on"), opened(shard) as file:
+    with _reported_faults(shard, lambda: f"from row {count} on"), opened(shard) as file:
         check_groups(file.metadata, range(file.num_row_groups))
         for batch in _batches(file, names, KEY_ROWS):
             _check_no_nulls(batch)
@@ -175,8 +175,8 @@ def _small_columns(shard: Shard, names: Sequence[str]) -> Iterator[pa.RecordBatc
 def _check_count(shard: Shard, count: int, ended: bool) -> None:
     """Raise `PoolError` if a file with so many rows, or more unless it has ended, is not what the manifest says."""
     if count > shard.rows or (ended and count < shard.rows):
-        told = f"more than {shard.rows}" if count > shard.rows else f"{count}"
-        raise PoolError(f"{shard.path} holds {told} rows, and the manifest promises {shard.rows}; restore it")
+        message = f"more than {shard.rows}" if count > shard.rows else f"{count}"
+        raise PoolError(f"{shard.path} holds {message} rows, and the manifest promises {shard.rows}; restore it")
 
 
 # --- files ------------------------------------------------------------------------------------------------------------
@@ -220,13 +220,13 @@ def read_footer(shard: Shard) -> tuple[pq.FileMetaData, list[int]]:
     Raises:
         PoolError: as `read_rows`.
     """
-    with _faults_told(shard, lambda: "at all"), opened(shard) as file:
+    with _reported_faults(shard, lambda: "at all"), opened(shard) as file:
         groups = map(file.metadata.row_group, range(file.num_row_groups))
         return file.metadata, list(accumulate(group.num_rows for group in groups))
 
 
 @contextmanager
-def _faults_told(shard: Shard, where: Callable[[], str]) -> Iterator[None]:
+def _reported_faults(shard: Shard, where: Callable[[], str]) -> Iterator[None]:
     """Report a file that cannot be read in one line.
 
     Raises:

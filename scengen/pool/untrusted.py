@@ -144,7 +144,7 @@ def _check_seconds(name: str, value: Any, most: float) -> None:
 
 
 def check_task_version(value: Any) -> None:
-    """Version of a task: a whole number from 1 on."""
+    """Version of a task: a whole number from 1 upwards."""
     check_whole("task_version", value)
     demand(value >= 1, f"task_version is {value}; versions of tasks begin with 1")
 

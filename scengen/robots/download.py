@@ -25,7 +25,7 @@ def main() -> int:
         print(f"the robot's files are in {folder}")
         if not complete((used := files.place()).folder):
             print(
-                f"but {used.told}, which is not complete, comes first; to use the cache, set {files.VARIABLE}={folder}"
+                f"but {used.label}, which is not complete, comes first; to use the cache, set {files.VARIABLE}={folder}"
             )
     except NoRobot as error:
         print(error, file=sys.stderr)
@@ -59,8 +59,8 @@ def wheel(folder: Path) -> Path:
     Raises:
         NoRobot: pip fails.
     """
-    asked = ["--no-deps", "--only-binary", ":all:", "--quiet", "--disable-pip-version-check", "--dest", str(folder)]
-    line = [sys.executable, "-m", "pip", "download", *asked, f"robosuite=={ROBOSUITE}"]
+    options = ["--no-deps", "--only-binary", ":all:", "--quiet", "--disable-pip-version-check", "--dest", str(folder)]
+    line = [sys.executable, "-m", "pip", "download", *options, f"robosuite=={ROBOSUITE}"]
     done = subprocess.run(line, capture_output=True, text=True, errors="replace")
     found = list(folder.glob("*.whl"))
     if done.returncode or not found:

@@ -33,7 +33,7 @@ class Place:
     """A folder in which the robot's files should be."""
 
     folder: Path
-    told: str
+    label: str
     """What the folder is, in an error."""
     remedy: str
     """What to do if a file in the folder is missing or another one."""
@@ -50,7 +50,7 @@ def place() -> Place:
     """The place from which this process reads the robot's files.
 
     Raises:
-        NoRobot: there is none, or the environment variable names no folder.
+        NoRobot: it does not exist, or the environment variable names no folder.
     """
     found = _named() or _installed() or _cached()
     if found is None:
@@ -77,10 +77,10 @@ def checked(name: str) -> Path:
         content = path.read_bytes()
     except OSError as error:
         raise NoRobot(
-            f"{name} cannot be read in {where.told}: {(error.strerror or 'fault').lower()}; {where.remedy}"
+            f"{name} cannot be read in {where.label}: {(error.strerror or 'fault').lower()}; {where.remedy}"
         ) from None
     if not is_ours(name, content):
-        raise NoRobot(f"{name} in {where.told} is not that of robosuite {ROBOSUITE}; {where.remedy}")
+        raise NoRobot(f"{name} in {where.label} is not that of robosuite {ROBOSUITE}; {where.remedy}")
     return path
 
 
@@ -96,12 +96,12 @@ def cached_folder() -> Path:
 
 def _named() -> Place | None:
     """The folder that the environment variable names."""
-    if not (told := os.environ.get(VARIABLE)):
+    if not (setting := os.environ.get(VARIABLE)):
         return None
-    folder = Path(told).expanduser().absolute()
+    folder = Path(setting).expanduser().absolute()
     remedy = f"set it to a folder with robosuite {ROBOSUITE}, or unset it"
     if not folder.is_dir():
-        raise NoRobot(f"{VARIABLE} = {cut(told)}, which is no folder; {remedy}")
+        raise NoRobot(f"{VARIABLE} = {cut(setting)}, which is not a folder; {remedy}")
     inner = (folder / ASSETS, folder / ASSETS.removeprefix("robosuite/"))
     folder = next((each for each in inner if each.is_dir()), folder)
     return Place(folder, f"{cut(str(folder))} ({VARIABLE})", remedy)
@@ -114,10 +114,10 @@ def _installed() -> Place | None:
     except PackageNotFoundError:
         return None
     folder = Path(str(robosuite.locate_file(ASSETS)))
-    told = f"the installed robosuite {robosuite.version} ({folder})"
+    message = f"the installed robosuite {robosuite.version} ({folder})"
     again = INSTALL.replace("--no-deps", "--no-deps --force-reinstall")
     remedy = f"run {again}, or set {VARIABLE} to a folder with this release"
-    return Place(folder, told, remedy) if folder.is_dir() else None
+    return Place(folder, message, remedy) if folder.is_dir() else None
 
 
 def _cached() -> Place | None:

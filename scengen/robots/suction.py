@@ -1,6 +1,6 @@
 """A suction cup on the Panda's flange, built here because robosuite has no suction gripper.
 
-        flange      The cup consists of four box pads in a body of its own. MuJoCo's adhesion acts on every contact of
+        flange      The cup consists of four box pads in a separate body. MuJoCo's adhesion acts on every contact of
           ||        a body, and a single box or cylinder drops a thin plate at 20 N: too few contact points hold it.
          _||_       The pull is a fixed force, unlike a vacuum. The control loop therefore applies it only while at
         [][]        least three of the pads touch something (`osc.MIN_SEALED_PADS`): a cup pulls only with a closed lip.

@@ -76,13 +76,13 @@ def extend(
             return True
         return sum(r.verdict == wanted.verdict for i, r in records.items() if i < index) < wanted.n
 
-    with writing_told(journal.folder):
+    with reported_write_errors(journal.folder):
         follow(records)
     items = itertools.takewhile(needed, missing)
     for record in each(attempt, items, wanted.workers, wanted.limits, attempt.lost_record):
         journal.add(record)
         records[record.index] = record.light()
-        with writing_told(journal.folder):
+        with reported_write_errors(journal.folder):
             follow(records)
         verdicts[record.verdict] += 1
         if record.check:
@@ -111,7 +111,7 @@ def rejection(record: Record) -> str:
 
 
 @contextmanager
-def writing_told(folder: Path) -> Iterator[None]:
+def reported_write_errors(folder: Path) -> Iterator[None]:
     """Report a folder that cannot be written.
 
     Raises:

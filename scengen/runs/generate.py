@@ -22,7 +22,7 @@ from ..validate.labels import labels_of_draw, labels_of_task, made_with
 from ..validate.settings import CertifySettings
 from ..work.limits import at_least
 from ..work.parallel import Limits, Workers
-from .attempts import Progress, Wanted, extend, first_of, infeasible, rejection, writing_told
+from .attempts import Progress, Wanted, extend, first_of, infeasible, rejection, reported_write_errors
 from .filling import Filling, moved_shards
 from .journal import Journal, Record
 
@@ -67,7 +67,7 @@ class Summary:
     first_draws: int
     """Number of indices whose first draw was certified."""
     attack: attacks.AttackReport | None
-    """Report of the adversary, if an attack was asked for."""
+    """Report of the adversary, if an attack was requested."""
     cpu: float
     """Processor time of all counted indices, in this run or earlier ones [s]."""
 
@@ -142,7 +142,7 @@ def generate(task: Task, certify_settings: CertifySettings, settings: GenerateSe
         _extend(job, settings, records, journal, progress)
         asked = settings.attack and first_of(records, "certified", settings.n)
         report = _attack(job, settings, records, journal, progress) if asked else None
-        with writing_told(folder):
+        with reported_write_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
             replace_file(folder / lock.LOCK_FILE, locked.encode())
             return _finish(folder, task, config, settings, records, journal, report)

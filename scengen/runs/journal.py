@@ -62,7 +62,7 @@ class Journal:
         kind: type[SceneRow] = PoolRow,
         setting: str = "pool",
     ):
-        """Begin or continue the run that makes `pool`.
+        """Start or continue the run that makes `pool`.
 
         Args:
             identity: all settings that the scenarios depend on.
@@ -71,10 +71,11 @@ class Journal:
             setting: name of the setting that names the folder, for errors.
 
         Raises:
-            ScengenError: the pool cannot be written, another run is writing it, or a run of another identity was begun.
+            ScengenError: the pool cannot be written, another run is writing it, or a run of another identity was
+                started.
         """
         if not pool.name or pool.name == "..":
-            raise PoolError(f"{pool} cannot become a pool; name a folder of its own with {setting}=")
+            raise PoolError(f"{pool} cannot become a pool; name a separate folder with {setting}=")
         try_folder(pool)
         self.folder, self._kind, self._setting = pool.with_name(pool.name + ".run"), kind, setting
         self._path = self.folder / "journal.sqlite"
@@ -99,7 +100,7 @@ class Journal:
 
     def _open(self, pool: Path, identity: Mapping[str, Any]) -> None:
         text = json.dumps(identity, sort_keys=True)
-        with self._faults_told():
+        with self._reported_faults():
             self._db = sqlite3.connect(self._path)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("CREATE TABLE IF NOT EXISTS run (identity TEXT)")
@@ -116,20 +117,20 @@ class Journal:
         if before is not None and begun[0] != text:
             differs = ", ".join(different(before, json.loads(text)))
             raise PoolError(
-                f"{pool} was begun with other settings ({differs}); choose another {self._setting}=, or move it and "
+                f"{pool} was started with other settings ({differs}); choose another {self._setting}=, or move it and "
                 f"{self.folder} aside"
             )
 
     def records(self) -> dict[int, Record]:
         """All records so far by index, without their rows, which do not fit into memory in a large run."""
-        with self._faults_told():
+        with self._reported_faults():
             found = self._db.execute("SELECT body, cpu FROM record ORDER BY idx")
             return {r.index: r for r in (Record(**json.loads(body), row=None, cpu=cpu).light() for body, cpu in found)}
 
     def rows(self, indices: Iterable[int]) -> Iterator[Any]:
         """The stored rows of some indices, one after the other."""
         for index in indices:
-            with self._faults_told():
+            with self._reported_faults():
                 query = "SELECT scene, actions FROM record WHERE idx = ?"
                 scene, actions = self._db.execute(query, (index,)).fetchone()
                 plain = json.loads(scene)
@@ -144,7 +145,7 @@ class Journal:
         if record.row is not None:
             scene = json.dumps(record.row.plain())
             actions = np.asarray(record.row.witness, np.float32).tobytes()
-        with self._faults_told(), self._db:
+        with self._reported_faults(), self._db:
             self._db.execute(
                 "INSERT OR REPLACE INTO record VALUES (?, ?, ?, ?, ?)",
                 (record.index, json.dumps(body), scene, actions, record.cpu),
@@ -157,17 +158,17 @@ class Journal:
             key: hash of its scenarios.
             entry: entry of the shard in a manifest.
         """
-        with self._faults_told(), self._db:
+        with self._reported_faults(), self._db:
             self._db.execute("INSERT OR REPLACE INTO shard VALUES (?, ?, ?)", (number, key, json.dumps(asdict(entry))))
 
     def shard(self, number: int, key: str) -> FileEntry | None:
         """Entry of a shard that was written; None if there is none with these scenarios."""
-        with self._faults_told():
+        with self._reported_faults():
             found = self._db.execute("SELECT entry FROM shard WHERE number = ? AND key = ?", (number, key)).fetchone()
             return FileEntry(**json.loads(found[0])) if found else None
 
     @contextmanager
-    def _faults_told(self) -> Iterator[None]:
+    def _reported_faults(self) -> Iterator[None]:
         """Report faults, and distinguish a damaged journal, which is useless, from one that cannot be reached.
 
         Raises:
@@ -187,7 +188,7 @@ class Journal:
 
 
 _KEPT = "finished work is kept, repeat the command to continue"
-_DAMAGED = "is damaged; move its folder aside (do not delete it) and repeat the command to begin again"
+_DAMAGED = "is damaged; move its folder aside (do not delete it) and repeat the command to start again"
 _READ_ONLY = f"is read-only; make it and its folder writable, {_KEPT}"
 _IN_USE = f"is in use by another program; wait for it, {_KEPT}"
 _FAULT = {

@@ -21,7 +21,7 @@ class ProgressBar:
     def __init__(self, console: PlainConsole, title: str, total: int | None, workers: Workers = 1):
         title = printable(title)
         self.console, self.title, self.total, self.workers = console, title, total, workers
-        self._last, self._said = time.monotonic(), 0
+        self._last, self._reported = time.monotonic(), 0
         self._first: tuple[float, int] | None = None
         """Time of the first call of `show`, and the work done by then, part of it by an earlier run."""
         columns = (
@@ -53,16 +53,16 @@ class ProgressBar:
     def show(self, done: int, note: str = "") -> None:
         """Show that `done` of the total are done."""
         now = time.monotonic()
-        if self._first is None or done < self._first[1]:  # other work has begun
+        if self._first is None or done < self._first[1]:  # other work has started
             self._first = now, done
         status = self.workers.status if isinstance(self.workers, Executor) else ""
         rate = (done - self._first[1]) / (now - self._first[0]) if now > self._first[0] else 0.0
-        told = ", ".join(text for text in (note, status, f"{rate:.2g}/s" if rate else "") if text)
-        self._progress.update(self._task, completed=done, note=told)
-        due = now - self._last > LINE_INTERVAL or (done == self.total and self._said != done)
+        message = ", ".join(text for text in (note, status, f"{rate:.2g}/s" if rate else "") if text)
+        self._progress.update(self._task, completed=done, note=message)
+        due = now - self._last > LINE_INTERVAL or (done == self.total and self._reported != done)
         if due and not self.console.is_terminal:
-            self._last, self._said = now, done
+            self._last, self._reported = now, done
             left = (self.total - done) / rate if rate and self.total else 0.0
             end = time.strftime(", ends %a %H:%M", time.localtime(time.time() + left)) if left else ""
             of = "" if self.total is None else f" of {self.total}"
-            self.console.print(f"{self.title}: {done}{of} {told}".rstrip() + end)
+            self.console.print(f"{self.title}: {done}{of} {message}".rstrip() + end)

@@ -68,7 +68,7 @@ class Axis:
     def at(self, severity: int, training: Mapping[str, Dist], known: Mapping[str, Parameter]) -> "Axis":
         """The axis at one severity: every value is at `severity / severities` of the path from training to the far end.
 
-        The path of a value begins at the nearest training value. It ends at the far end of its range, or at the
+        The path of a value starts at the nearest training value. It ends at the far end of its range, or at the
         measured limit if there is one. A range thus becomes one value; several separate values remain several.
 
         Raises:

@@ -139,7 +139,7 @@ Design = Independent | Sobol | Latin | Grid
 NUMBERED = ("lhs", "grid")
 """Designs with a number in their spelling."""
 SOBOL = 128
-"""Number of points from which on a Sobol set is useful. Below it, pairs of parameters correlate, up to 0.95 at 32 and
+"""Number of points from which a Sobol set is useful. Below it, pairs of parameters correlate, up to 0.95 at 32 and
 0.76 at 50 points, and the effect of one of them alone cannot be estimated. Latin hypercubes stay below 0.5."""
 KINDS = ("iid", "sobol", *NUMBERED)
 """Names of the designs."""
@@ -169,7 +169,7 @@ def parse(spelled: str, key: str, training: Mapping[str, Dist]) -> Design:
     if kind == "grid" and count >= 1:
         sizes = {name: _values(dist, count) for name, dist in training.items() if not isinstance(dist, Fixed)}
         return Grid(key, sizes, count)
-    hint = f" ({kind} needs a whole number from 1 on)" if kind in NUMBERED else nearest(kind, KINDS)
+    hint = f" ({kind} needs a whole number from 1 upwards)" if kind in NUMBERED else nearest(kind, KINDS)
     raise BadConfig(f"sampler = {spelled}{hint}; known: {SPELLED}")
 
 

@@ -126,8 +126,8 @@ class Task:
         """
         if version == self.version:
             return ""
-        told = "an unknown version" if version is None else f"version {version}"
-        return f"{made} {told} of {self.name}; installed: {self.version}"
+        message = "an unknown version" if version is None else f"version {version}"
+        return f"{made} {message} of {self.name}; installed: {self.version}"
 
     @cached_property
     def nominal(self) -> Scenario:
@@ -348,16 +348,16 @@ def _scans(name: str, family: type[Scenario], node: Mapping[str, Any]) -> dict[s
     if node and not things(family):
         raise BadConfig(f"{name}.scans: {family.__name__} has no YCB object; leave them out")
     every, found = by_name(), {}
-    for called, told in node.items():
+    for called, entry in node.items():
         where = f"{name}.scans.{cut(str(called))}"
         if called not in every:
             raise UnknownName(f"scan of {name}", cut(str(called)), every)
-        _check_keys(where, _group(where, told), ("file", "sha256", "settings", "solid"), ())
+        _check_keys(where, _group(where, entry), ("file", "sha256", "settings", "solid"), ())
         try:
-            prop = MeshProp.read(told["solid"])
+            prop = MeshProp.read(entry["solid"])
         except (ValueError, TypeError) as error:
             raise BadConfig(f"{where}.solid is not a solid: {cut(str(error))}") from None
-        text = json.dumps(told["solid"], sort_keys=True)
+        text = json.dumps(entry["solid"], sort_keys=True)
         sha256 = hashlib.sha256(text.encode()).hexdigest()
         found[called] = Scan(sha256, replace(prop, rgba=getattr(every[called].prop, "rgba", prop.rgba)))
     return found
@@ -447,8 +447,8 @@ def _limits(
 def _positive(where: str, value: Any) -> float:
     """A positive number of seconds."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= MAX_HORIZON:
-        told = cut(repr(value))
-        raise BadConfig(f"{where} = {told}; it must be a positive number of seconds, at most {MAX_HORIZON:g}")
+        shown = cut(repr(value))
+        raise BadConfig(f"{where} = {shown}; it must be a positive number of seconds, at most {MAX_HORIZON:g}")
     return float(value)
 
 

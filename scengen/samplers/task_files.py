@@ -136,7 +136,7 @@ def behaviour_file(name: str, search: Sequence[str] = ()) -> Path:
 def version(name: str, search: Sequence[str] = ()) -> int:
     """Version of a task: the `VERSION` that the class of its family states in its file, which is not imported; else 1.
 
-    A module that cannot be found is version 1, too: an error tells of it when the task is loaded.
+    A module that cannot be found is version 1, too; loading the task raises the error.
 
     Raises:
         UnknownName: there is no such file.
@@ -194,9 +194,9 @@ def about(name: str, search: Sequence[str] = ()) -> About:
         raise BadConfig(f"{name}.axes = {cut(repr(axes))}; expected a group of settings, {{name: value}}")
     source = paper_source(name, str(words["category"]))
     of_paper = [axis for axis, node in axes.items() if isinstance(node, Mapping) and node.get("source") == source]
-    told = {key: str(value) for key, value in words.items()}
+    values = {key: str(value) for key, value in words.items()}
     return About(
-        name, **told, embodiment=str(head.get("embodiment", EMBODIMENT)), axes=(*axes,), paper_axes=(*of_paper,)
+        name, **values, embodiment=str(head.get("embodiment", EMBODIMENT)), axes=(*axes,), paper_axes=(*of_paper,)
     )
 
 

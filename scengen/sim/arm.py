@@ -34,7 +34,7 @@ class Arm:
         self.grip = -1.0
         """Gripper command of the last action: -1 open or suction off, 1 closed or suction on. Before the first action:
         1 if the jaw holds a body at the start, else -1."""
-        self.told: NDArray[np.float64] = IDLE
+        self.scripted_action: NDArray[np.float64] = IDLE
         """Action of a scripted arm in the coming control period, shape (7,)."""
         joints = [model.joint(name) for name in names.joints]
         self._qpos, self._dofs = [j.qposadr[0] for j in joints], [j.dofadr[0] for j in joints]
@@ -97,7 +97,7 @@ class Arm:
         return np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.grip])
 
     def jam(self, on: bool) -> None:
-        """Force the gripper open, or switch the suction off, whatever is commanded, until `jam(False)` is called.
+        """Force the gripper open, or switch the suction off, against any command until `jam(False)` is called.
 
         The jam acts in every physics step and belongs to the state.
 
@@ -107,7 +107,7 @@ class Arm:
         self.world.check_event("jamming a gripper")
         self.world.loop.jam(self.number, on)
 
-    def tell(self, action: ArrayLike) -> None:
+    def set_action(self, action: ArrayLike) -> None:
         """Set the action of a scripted arm for the coming control period only. Without a call the arm stays in place,
         open.
 
@@ -120,9 +120,9 @@ class Arm:
         """
         if self not in self.world.partners:
             raise UnknownName("scripted arm", self.label, [arm.label for arm in self.world.partners])
-        self.world.check_event(f"telling {self.label}")
-        self.told = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-        self.grip = float(self.told[-1])
+        self.world.check_event(f"setting the action of {self.label}")
+        self.scripted_action = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+        self.grip = float(self.scripted_action[-1])
 
     def wrench(self) -> NDArray[np.float64]:
         """Force [N] and torque [N m] between hand and wrist in the axes of the wrist's sensor frame, shape (6,).

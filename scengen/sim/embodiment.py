@@ -62,7 +62,7 @@ def action_size(embodiment: str) -> int:
 def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjSpec:
     """A scene from a pool with its robot added, by default without visual geometry.
 
-    The text is parsed anew, so that exactly the scene on disk is simulated.
+    The text is parsed again, so that exactly the scene on disk is simulated.
     """
     scene_text.check(scene_xml)
     scene = from_mjcf(scene_xml)

@@ -23,7 +23,8 @@ class RecordingWorld(World):
     """A world that answers like any other, and records questions about contact."""
 
     asked: list[Question] = field(default_factory=list, init=False)
-    """Questions since the world was made, in order. `asked.clear()` starts anew; copies and pickles start empty."""
+    """Questions since the world was made, in order. `asked.clear()` empties the list; copies and pickles start
+    empty."""
 
     @classmethod
     def twin(cls, world: World) -> Self:

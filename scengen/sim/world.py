@@ -47,9 +47,9 @@ class World:
     arms: tuple[Arm, ...] = field(init=False)
     """Arms that actions drive. An action holds seven numbers for each, in this order."""
     partners: tuple[Arm, ...] = field(init=False)
-    """Arms that events move (`Arm.tell`)."""
+    """Arms that events move (`Arm.set_action`)."""
     memory: Memory = field(init=False)
-    """Numbers that record the episode's history, by the names that the scene was told to `remember`; all 0 at the
+    """Numbers that record the episode's history, by the names that the scene declares with `remember`; all 0 at the
     start."""
     style: Style | None = field(default=None, init=False)
     """Style of the moves in this episode; None for those of certificates. A reset removes it."""
@@ -90,7 +90,7 @@ class World:
         return world
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles get a simulation of their own in the same state: addresses are found anew."""
+        """Copies and pickles get a separate simulation in the same state: addresses are looked up again."""
         return _revived, (type(self), self.model, self.scripted, self.state())
 
     def reset(self) -> None:
@@ -99,7 +99,7 @@ class World:
         self.filter.reset()
         self.style = None
         for arm in (*self.arms, *self.partners):
-            arm.grip, arm.told = (1.0 if self.loop.holds and arm.number == 0 else -1.0), IDLE
+            arm.grip, arm.scripted_action = (1.0 if self.loop.holds and arm.number == 0 else -1.0), IDLE
 
     @property
     def size(self) -> int:
@@ -116,30 +116,30 @@ class World:
             Unstable: MuJoCo raised a warning.
         """
         filtered = self.filter(action)
-        self.apply(filtered)
+        self.step_filtered(filtered)
         return filtered
 
-    def apply(self, filtered: NDArray[np.float32]) -> None:
+    def step_filtered(self, filtered: NDArray[np.float32]) -> None:
         """Advance one control period under an action that has already passed the filter, shape (7 * arms,).
 
         Raises:
             ValueError: the action has another shape or is not finite.
             Unstable: MuJoCo raised a warning.
         """
-        warnings = self.loop.step(self.joined(filtered))
-        self.command(filtered)
+        warnings = self.loop.step(self.with_partner_actions(filtered))
+        self.record_grip(filtered)
         if warnings:
             raise Unstable(f"MuJoCo raised a warning at t = {self.time:.3f} s: {', '.join(self.warnings)}")
 
-    def joined(self, action: NDArray[np.floating]) -> NDArray[np.floating]:
+    def with_partner_actions(self, action: NDArray[np.floating]) -> NDArray[np.floating]:
         """An action, shape (7 * arms,), followed by the partners' actions: the input of the controllers of all arms."""
         if not self.partners:
             return action
         if np.shape(action) != (self.size,):
             raise ValueError(f"an action has shape ({self.size},), not {np.shape(action)}")
-        return np.concatenate([action, *(arm.told for arm in self.partners)], dtype=np.float32)
+        return np.concatenate([action, *(arm.scripted_action for arm in self.partners)], dtype=np.float32)
 
-    def command(self, action: NDArray[np.floating]) -> None:
+    def record_grip(self, action: NDArray[np.floating]) -> None:
         """Record the gripper commands of an action, shape (7 * arms,), that this or another simulator has simulated."""
         for arm in self.arms:
             arm.grip = float(action[ACTION * arm.number + ACTION - 1])
@@ -150,12 +150,12 @@ class World:
     def events(self) -> Iterator[None]:
         """The moment before a control period in which a scenario's events happen. An `Episode` opens it.
 
-        Forces (`force`) and partners' actions (`Arm.tell`) of the previous period end here.
+        Forces (`force`) and partners' actions (`Arm.set_action`) of the previous period end here.
         """
         self._happening = True
         self.data.xfrc_applied[:] = 0.0
         for arm in self.partners:
-            arm.grip, arm.told = -1.0, IDLE
+            arm.grip, arm.scripted_action = -1.0, IDLE
         try:
             yield
         finally:
@@ -191,7 +191,7 @@ class World:
         self.data.mocap_quat[mocap[self.body(body)]] = turn
 
     def passes(self, moment: float) -> bool:
-        """Whether `moment` [s] falls into the control period that begins now, to the nearest period."""
+        """Whether `moment` [s] falls into the control period that starts now, to the nearest period."""
         return abs(self.time - moment) < Loop.PERIOD / 2
 
     def launch(self, body: str, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
@@ -296,7 +296,7 @@ class World:
     def touching(self, a: str, b: str) -> bool:
         """Whether two bodies were in contact at any physics step of the last control period.
 
-        `ROBOT` and the `label` of an arm are accepted in the place of a body.
+        `ROBOT` and the `label` of an arm are accepted in place of a body.
         """
         return bool(self.loop.touching[self.row(a), self.row(b)])
 
@@ -333,7 +333,7 @@ class World:
         for arm, grip in zip(self.arms, grips, strict=True):
             arm.grip = float(grip)
         for arm in self.partners:
-            arm.grip, arm.told = -1.0, IDLE  # the events of the coming period set it again
+            arm.grip, arm.scripted_action = -1.0, IDLE  # the events of the coming period set it again
 
     @property
     def digest(self) -> str:

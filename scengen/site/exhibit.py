@@ -16,7 +16,7 @@ from ..errors import BadConfig, Infeasible, ScengenError
 from ..pictures import film
 from ..pictures.render import Picture, camera, encode
 from ..pictures.sheet import moved
-from ..pictures.twins import telling, twin_pictures
+from ..pictures.twins import comparison_view, twin_pictures
 from ..pool import PoolRow
 from ..runs.generate import row_of
 from ..samplers.axis import Axis
@@ -50,7 +50,7 @@ FRAMES = 8
 VISIBLE = 20
 """Difference of a pixel that a person sees [1/255], and number of such pixels from which pictures differ."""
 Progress = Callable[[str], None]
-"""Function that is told what is made next."""
+"""Function that is called with the name of the next item."""
 
 
 @dataclass(frozen=True)
@@ -241,7 +241,7 @@ def _pair(task: Task, axis: Axis, folder: Path, stem: str) -> Pair:
         return Pair(axis.name, "", [], False)
     scenarios = [task.draw(ID, SEED, index).scenario, *(draw.scenario for draw in draws)]
     worlds = [World.load(rebuild(scenario), task.embodiment, visual=True) for scenario in scenarios]
-    pictures = twin_pictures(*worlds, size=TWIN, view=telling(worlds, TWIN[0] / TWIN[1]))
+    pictures = twin_pictures(*worlds, size=TWIN, view=comparison_view(worlds, TWIN[0] / TWIN[1]))
     files = [f"{stem}-{number}.webp" for number in range(len(pictures))]
     for name, picture in zip(files, pictures, strict=True):
         _save(folder / name, picture)
@@ -276,16 +276,16 @@ def _endings(row: PoolRow, check: str) -> list[Ending]:
     """How the plans that must fail have failed, by the certificate, which may be a stranger's."""
     found = []
     for numbers in (each.numbers for each in row.certificate.checks if each.name == check):
-        for plan, told in numbers.items():
-            ways = told.items() if isinstance(told, Mapping) and "outcome" not in told else [("", told)]
+        for plan, outcomes in numbers.items():
+            ways = outcomes.items() if isinstance(outcomes, Mapping) and "outcome" not in outcomes else [("", outcomes)]
             found += [_ending(plan, how, end) for how, end in ways if isinstance(end, Mapping)]
     return found
 
 
 def _ending(plan: str, how: str, end: Mapping[str, Any]) -> Ending:
     seconds = end.get("seconds")
-    told = (str(end.get("outcome", "")), str(end.get("reason", "")))
-    return Ending(str(plan), str(how), *told, float(seconds) if isinstance(seconds, (int, float)) else 0.0)
+    verdict = (str(end.get("outcome", "")), str(end.get("reason", "")))
+    return Ending(str(plan), str(how), *verdict, float(seconds) if isinstance(seconds, (int, float)) else 0.0)
 
 
 def _words(task: Task) -> str:

@@ -2,7 +2,7 @@
 
 viser's page fetches a recording (`?playbackPath=`), which browsers refuse for pages that are opened as files. It also
 plays one that a script has put into the page, as `StateSerializer.as_html` does; that works anywhere. Here the page is
-stored once, and each recording is a script of its own.
+stored once, and each recording is a separate script.
 """
 
 import base64

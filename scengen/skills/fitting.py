@@ -87,7 +87,7 @@ def fit(arm: Arm, piece: str, face: Vec3, pos: Vec3, yaw: float, high: float, li
 
 
 def lay(arm: Arm, piece: str, face: Vec3, pos: Vec3, yaw: float, high: float, lies: Condition) -> Plan:
-    """Bring a piece to a place, press it down softly and let go, wherever it lies then. See `fit` for the arguments."""
+    """Bring a piece to a place, press it down softly and let go at the resulting place. See `fit` for the arguments."""
     with suppress(GaveUp):
         yield from fetch(arm, piece, face, pos, yaw)
         yield from insert(arm, piece, pos, yaw, high, lies)

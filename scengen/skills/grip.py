@@ -37,7 +37,7 @@ class Grip:
 
 
 def take(arm: Arm, body: str, above: float = 0.10, lift: float = 0.12) -> Plan:
-    """Grasp an object in whatever pose it lies, and lift it. See `jaw.pick`.
+    """Grasp an object in any pose, and lift it. See `jaw.pick`.
 
     Args:
         arm: the arm.

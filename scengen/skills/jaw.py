@@ -150,7 +150,7 @@ def lower(
 def carry(
     arm: Arm, body: str, pos: ArrayLike, rot: Mat3 | None = None, pace: Pace = FINE, ends: Condition = lambda: False
 ) -> Plan:
-    """Move a held body in a straight line to a pose, wherever it sits in the jaw.
+    """Move a held body in a straight line to a pose, for any position in the jaw.
 
     Args:
         arm: the arm.

@@ -1,4 +1,4 @@
-"""Moves of a hand that types on a keyboard, wherever that has been moved. See `motion`."""
+"""Moves of a hand that types on a keyboard, at its current place. See `motion`."""
 
 import math
 from collections.abc import Callable

@@ -67,7 +67,7 @@ class Manner:
     styled: bool = False
     """Whether there is a style."""
     pause: float = 0.0
-    """Time before the move begins [s]."""
+    """Time before the move starts [s]."""
     length: float = 0.0
     """Length of the move [m]."""
     detour: Vec3 | None = None
@@ -77,7 +77,7 @@ class Manner:
 
     @classmethod
     def of(cls, arm: Arm, goal: Vec3, pace: Pace) -> Self:
-        """The manner of a move that begins now. Its numbers depend on the style, the arm and the time."""
+        """The manner of a move that starts now. Its numbers depend on the style, the arm and the time."""
         style = arm.world.style
         if style is None:
             return cls(pace)

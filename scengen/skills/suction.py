@@ -13,18 +13,18 @@ from .motion import CLOSED, INTEGRAL_ANGLE, MAX_CORRECTION, OPEN, STEADY, Pace, 
 from .pace import approach
 from .waiting import at_most
 
-ABOVE = 0.03
+APPROACH_HEIGHT = 0.03
 """Height above a face from which the cup comes down on it [m]."""
 FIRMLY = 0.15
 """Time that the cup must hold on before a piece is lifted [s]."""
 BRAKE = 6.0
 """Speed limit of carrying per metre of remaining distance [1/s]."""
-FIRM = 1.6
+FIRM_TRANSLATION = 1.6
 """Gain of `firm` over `steer` in translation, against the friction of the joints: under noisy actions, a hand that
 carries a piece trembles least at this gain and `FIRM_TURN`."""
 FIRM_TURN = 2.0
 """Gain of `firm` over `steer` in rotation."""
-NEAR = 0.003
+INTEGRAL_DISTANCE = 0.003
 """Distance to the target below which errors are integrated [m]."""
 INTEGRAL = 1.0
 """Integral gain of the error of a carried piece [1/s]."""
@@ -42,7 +42,9 @@ ADDING = 2.0
 """Integral gain of the error of a hand that is squared up [1/s]; at 4 the hand swings by a degree to either side."""
 
 
-def take(arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.08, above: float = ABOVE, pace: Pace = STEADY) -> Plan:
+def take(
+    arm: Arm, spot: Vec3, rot: Mat3, speed: float = 0.08, above: float = APPROACH_HEIGHT, pace: Pace = STEADY
+) -> Plan:
     """Come down on a face at `spot` [m] from `above` it [m], and take hold of it with the cup; see `suck`."""
     yield from go_to(arm, spot + above * UP, rot, pace, OPEN)
     yield from suck(arm, spot, rot, speed)
@@ -139,7 +141,7 @@ def let_go(arm: Arm) -> Plan:
 
 def firm(arm: Arm, setpoint: Vec3, velocity: Vec3, turn: Vec3) -> Action:
     """Action as of `steer` with suction on, but stiffer: for the last millimetres of slow moves, against friction."""
-    return steer(arm, arm.hand + FIRM * (setpoint - arm.hand), velocity, FIRM_TURN * turn, CLOSED)
+    return steer(arm, arm.hand + FIRM_TRANSLATION * (setpoint - arm.hand), velocity, FIRM_TURN * turn, CLOSED)
 
 
 def carry(
@@ -161,7 +163,7 @@ def carry_to(
     rot: Mat3,
     pace: Pace = STEADY,
     slack: float = math.inf,
-    near: float = NEAR,
+    near: float = INTEGRAL_DISTANCE,
 ) -> Plan:
     """Bring a body that hangs on the hand, or is held by a jaw, to `target` [m], turned to `rot`, by feedback.
 

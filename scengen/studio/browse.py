@@ -115,7 +115,7 @@ class Browser:
             self._place.value = place
 
     def _run(self, work: Callable[[], None]) -> None:
-        """Do some work after the one before; tell a fault on the page."""
+        """Do some work after the previous one; show a fault on the page."""
         with self._busy:
             try:
                 work()
@@ -130,7 +130,7 @@ class Browser:
             return
         self._shown = (str(self.pool.folder), place)
         self.player.unload()
-        self._row = self._world = None  # whatever happens below, the page shows nothing of another scenario
+        self._row = self._world = None  # if anything below fails, the page shows nothing of another scenario
         with self._client.atomic():
             self._view.clear()
             self._twin.clear()

@@ -140,7 +140,7 @@ class Driver:
         self._thread = threading.Thread(target=self._drive, daemon=True)
 
     def start(self) -> None:
-        """Begin with the first take."""
+        """Start with the first take."""
         self._thread.start()
 
     def close(self) -> None:
@@ -209,7 +209,7 @@ class Shown:
 
 
 class DrivePage:
-    """What one browser shows of the takes. A thread of its own sends, so that the control loop does not wait."""
+    """What one browser shows of the takes. A separate thread sends, so that the control loop does not wait."""
 
     def __init__(self, client: viser.ClientHandle, driver: Driver):
         self._client, self._view = client, SceneView(client.scene, "/drive")

@@ -114,7 +114,7 @@ class Judge:
         self._describe()
 
     def _run(self, work: Callable[[], None]) -> None:
-        """Do some work after the one before; tell a fault on the page."""
+        """Do some work after the previous one; show a fault on the page."""
         with self._busy:
             try:
                 work()

@@ -27,11 +27,11 @@ FACES = {
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): 480,
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): 1280,
 }
-"""Numbers of triangles of geoms that are no meshes, by type."""
+"""Numbers of triangles of geoms that are not meshes, by type."""
 SHOWN_GROUPS = 3
 """Number of MuJoCo's geom groups that are shown, from 0: those of pictures."""
 GRID = 2.0**-12
-"""Distance of the places that vertices of meshes can have [m]: 0.24 mm, which nobody sees."""
+"""Distance of the places that vertices of meshes can have [m]: 0.24 mm, which is not visible."""
 ROBOT_SHARE = 0.05
 """Share of the triangles of large parts of the robot that is shown. 95 % of the surface moves by less than 2 mm, and a
 browser that draws in software gets through four times as many pictures."""
@@ -46,7 +46,7 @@ STILL = 1e-5
 FRAME_PERIODS = 4
 """Number of control periods between two frames: 25 frames a second."""
 FAULTS = (ScengenError, ValueError, KeyError, TypeError, IndexError, ArithmeticError, RecursionError)
-"""Errors that a stranger's data may cause; the page tells them."""
+"""Errors that untrusted data may cause; the page shows them."""
 Poses = NDArray[np.float32]
 """Poses of all bodies, shape (bodies, 7): position [m], orientation wxyz."""
 

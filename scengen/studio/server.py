@@ -123,5 +123,5 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
 
 def close_server(server: viser.ViserServer) -> None:
     """Close the server."""
-    with patch("rich.print"):  # viser would tell of it
+    with patch("rich.print"):  # viser would report it
         server.stop()

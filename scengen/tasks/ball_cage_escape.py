@@ -345,7 +345,7 @@ class BallCageEscape(Scenario):
 
     @property
     def rolling_tilt(self) -> float:
-        """Tilt of the floor at which the ball begins to roll by itself [rad]."""
+        """Tilt of the floor at which the ball starts to roll by itself [rad]."""
         return math.atan(self.rolling)
 
     @property

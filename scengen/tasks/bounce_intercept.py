@@ -9,13 +9,13 @@
      o            .          robot
 
 Bottleneck: the ball is faster than the hand. The place where it can be caught depends on the place of the bounce and on
-the speed that the wall returns. Even on a smooth floor the path is no mirror image: the wall takes a sixth of the speed
-along its normal, and nothing of the speed along the wall.
+the speed that the wall returns. Even on a smooth floor the path is not a mirror image: the wall takes a sixth of the
+speed along its normal, and nothing of the speed along the wall.
 
 Decisions, where the paper (App. B, T13) is silent:
 
 * The floor is a smooth mat, on which the ball slides without turning. A ball that rolls keeps its spin in the bounce,
-  slips, and ends with 2/7 of the speed before and 5/7 of that after it, which is no mirror image at all. That is an
+  slips, and ends with 2/7 of the speed before and 5/7 of that after it, which is not a mirror image at all. That is an
   axis.
 * The walls take 12 to 20 % of the speed in training, like fresh cushions; a bounce takes 22 ms.
 * The hand may be anywhere, also between the walls. If it touches the ball before the ball has met a wall, the episode
@@ -23,7 +23,7 @@ Decisions, where the paper (App. B, T13) is silent:
 * Strict rules that the paper lacks (`launched_ball`). The hand waits within 25 mm of where it is when the ball leaves
   the last wall, and the first touch is the catch. Otherwise T12 after the bounce was enough: a hand that followed the
   ball caught 8 of 12, and one that went ahead on its straight line 11 of 12; now 0 of 12. A policy may still correct
-  its place for the speed that the wall took. "The catchable zone" of the paper begins 6 cm from the walls: a hand that
+  its place for the speed that the wall took. "The catchable zone" of the paper starts 6 cm from the walls: a hand that
   followed a slow ball up to a wall (axis `dead_walls`) was in its place when the ball left it.
 * Aims, places and both sides are drawn so widely that no place serves many: after a bounce, 16 % of the balls come
   within 20 mm of the best one, between open fingers that are turned the right way there. A hand that hovers over the
@@ -66,7 +66,7 @@ from .launched_ball import (
     way_at,
 )
 
-CATCHABLE_DISTANCE = 0.06  # distance of the ball's centre from the walls from which on it may be caught [m]
+CATCHABLE_DISTANCE = 0.06  # distance of the ball's centre from the walls from which it may be caught [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,7 +172,7 @@ class BounceIntercept(LaunchedBall):
         return plans
 
     def _go_to_it(self, world: World) -> Plan:
-        """Pick the ball at the place where it begins to move."""
+        """Pick the ball at the place where it starts to move."""
         yield from self.observe(world)
         yield from self.pick_at(world, world.com("ball"))
 
@@ -223,7 +223,7 @@ class BounceIntercept(LaunchedBall):
         met = self.meeting(ways, PARKED_HAND, lead=2.5 * LEAD_TIME)
         late = "the hand comes too late to every place on the ball's way"
         yield require(met is not None, late, speed=self.speed, hand=HAND_SPEED)
-        until = [way for way in ways if way.begins < (met[1] if met else math.inf)]
+        until = [way for way in ways if way.starts < (met[1] if met else math.inf)]
         nearest = min(*(float(placed.inside(way.at)[0]) for way in until[1:]), *map(placed.end_distance, until))
         # In a corner two walls return the ball one after the other or at once, each a part of the velocity of its own.
         yield require(nearest >= width, "the ball meets the end of a wall", nearest=max(nearest, -1.0), near=width)
@@ -264,20 +264,20 @@ class BounceIntercept(LaunchedBall):
             ways: of the ball from now on, in the world.
             hand: place of the hand [m].
             lead: time by which the hand must arrive before the ball [s].
-            bounced: whether the first way already begins at a wall.
+            bounced: whether the first way already starts at a wall.
         """
         times, placed = np.arange(0.0, FORESIGHT_TIME, 0.05), self.placed
         passed = np.array([place_on(ways, t)[:2] for t in times])
 
         def path(seconds: float) -> Vec3 | None:
             k, now = way_at(ways, seconds)
-            ends = ways[k + 1].begins if k + 1 < len(ways) else math.inf
+            ends = ways[k + 1].starts if k + 1 < len(ways) else math.inf
             # The ball can be taken from 0.10 s after a bounce until 0.15 s before the next one.
-            if (k == 0 and not bounced) or seconds < now.begins + 0.10 * (k > 0) or seconds > ends - 0.15:
+            if (k == 0 and not bounced) or seconds < now.starts + 0.10 * (k > 0) or seconds > ends - 0.15:
                 return None
             at = place_on(ways, seconds)
             # The hand may come there up to 2 s before the ball's last way; earlier ways must pass 0.10 m beside it.
-            earlier = passed[(times > now.begins - 2.0) & (times < now.begins)]
+            earlier = passed[(times > now.starts - 2.0) & (times < now.starts)]
             if len(earlier) and np.hypot(*(earlier - at[:2]).T).min() < 0.10:
                 return None
             return None if placed.wall_distance(at) < 0.085 else at  # half the width of an open hand, and a clearance

@@ -271,7 +271,7 @@ class BowlTable(Scenario):
 
     def constraints(self) -> Iterator[Refutation | None]:
         bowl, rack = self.bowl, self.rack
-        # 8 mm is twice the clearance: so the rim stays in the ring wherever the bowl is pushed.
+        # 8 mm is twice the clearance: so the rim stays in the ring for any push of the bowl.
         yield require(rack.height > 0.008, "the ring is too low to keep the bowl", height=rack.height)
         yield on_table("the rack", corners(self.foot, 0.0, 2 * [2 * rack.outer]))
         yield on_table("the square", corners(self.goal, 0.0, 2 * [self.patch.size]))

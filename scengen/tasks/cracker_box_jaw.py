@@ -14,7 +14,7 @@ Decisions, where the paper (App. B, T09) says no more than "tight slot outline" 
 
 * The slot and the box are those of T08 (`assets.cracker_box`), the box no thicker than the jaw opens. Its thickness is
   the "narrow side": across its width, "the flat side", no jaw reaches.
-* A box that falls beside the slot is no failure by rule: it lies flat, with nothing that a jaw reaches around.
+* A box that falls beside the slot is not a failure by rule: it lies flat, with nothing that a jaw reaches around.
 * A strict rule that the paper lacks: a box that touches the slot, steeper than `MAX_RELEASE_ANGLE` and not touched by
   the robot, loses the episode. Stood up in the slot and toppled, the box comes in by gravity alone, and a few shoves
   finish it (12 of 12). A held box may stand in the slot at any angle. The rule closes a way, it opens none.

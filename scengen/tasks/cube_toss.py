@@ -128,7 +128,7 @@ class CubeToss(Scenario):
         return scene
 
     def _add_rim(self, tray: mujoco.MjsBody) -> None:
-        """Put a rim on the walls, a body of its own, so that contacts tell it from the walls."""
+        """Put a rim on the walls, a separate body, so that contacts distinguish it from the walls."""
         rim, (half_x, half_y), wall = tray.add_body(name="rim"), (self.opening / 2, BREADTH / 2), self.tray.wall / 2
         z = self.tray.floor + self.tray.depth + RIM_HEIGHT / 2
         for side in (-1, 1):

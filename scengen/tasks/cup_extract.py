@@ -24,7 +24,7 @@ Decisions, where the paper (App. B, T24) is silent:
   in the paper's T12 and T13. The cup may then be anywhere on the table. Pouring the block straight into the region
   counts, and so does shaking it out of a cup held level by its handle: the insight is the same.
 * The friction of the wall is not visible; a cup that is turned slowly shows it. There is no `answer` to guess, because
-  turning the cup farther than needed is no failure.
+  turning the cup farther than needed is not a failure.
 """
 
 import math

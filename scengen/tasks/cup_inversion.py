@@ -117,8 +117,8 @@ class CupInversion(Scenario):
     def oracle(self, world: World) -> Plan:
         """Hold the cup out with the suction hand, hand it over to the jaw, put it down upright.
 
-        Every target is computed from the cup's pose when its move begins, so that each move corrects the error of the
-        one before.
+        Every target is computed from the cup's pose when its move starts, so that each move corrects the error of the
+        previous one.
         """
         right, left = world.arms
         yield from alone(left, self.wait_beside(left))

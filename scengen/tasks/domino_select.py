@@ -4,7 +4,7 @@
      |   |   |   |       #            red           lane 4   gap: a tile stands beside the chain
                  |       #
      |   |   |   |   |   #                          lane 3   intact
-     | |  |    |         #                          lane 2   drift: each space is wider than the one before
+     | |  |    |         #                          lane 2   drift: each space is wider than the previous one
      |   |       |   |   #                          lane 1   (not in training) a tile is missing
      |   |   |   |   |   @            blue          lane 0   decoy: intact, but leads to the wrong slab
 
@@ -19,7 +19,7 @@ Decisions:
   identifies this chain and nothing else.
 * Each scene has one chain of each of the paper's defects (gap, drift, wrong target) and a fourth with a gap or a drift.
 * One try: the robot may touch one first tile and nothing else, and may topple it but not carry it; anything else ends
-  the episode. Touching a wrong first tile is no failure: the goal can no longer be reached, so every wrong chain is
+  the episode. Touching a wrong first tile is not a failure: the goal can no longer be reached, so every wrong chain is
   judged by physics alone. Each certificate topples each wrong chain as the oracle topples the right one, until
   everything is at rest.
 * Chance: the intact chain is each of the four that lead to the red slab equally often, and the others are dealt at

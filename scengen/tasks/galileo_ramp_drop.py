@@ -16,8 +16,9 @@ upper edge. The patch is `Ramp.band` = 3 mm high: a sliding ball crosses its low
 without friction no state lasts. Crossing the upper edge ends the episode, and HOLD is longer than the time to cross the
 patch. (2) The robot may not touch the ball beyond the middle of the ramp, nor again after its run: it could carry it to
 the patch, or try higher and higher. Nor may the ball fall on the ramp: from one of six fixed places a bouncing ball
-comes down on the patch. To push it on the near side is no failure, but makes it too fast. (3) The paper calls the ramp
-frictionless and ships it with 0.10 to 0.50 (App. C). Training is close to the former. App. C is an axis, where the ball
+comes down on the patch. To push it on the near side is not a failure, but makes it too fast. (3) The paper calls the
+ramp frictionless and ships it with 0.10 to 0.50 (App. C). Training is close to the former. App. C is an axis, where the
+ball
 rolls: that changes its speed (sqrt(10/7 g h) instead of sqrt(2 g h)) and not the height. The loss is in between, where
 the ball slips as it rolls (`Ramp.climb`). (4) The tray is fixed to the table: a tray that moves is a tool.
 """

@@ -8,7 +8,7 @@
        \\
         o agent
 
-Bottleneck: every letter has its turn and its owner. From the word and from the bold letters, the agent must tell whose
+Bottleneck: every letter has its turn and its owner. From the word and from the bold letters, the agent must infer whose
 turn it is. It must keep away from the keyboard in the partner's turn, hit one key of 26 with a finger 26 mm wide, and
 keep it down until it counts. No key takes a letter back.
 
@@ -17,16 +17,16 @@ Decisions, where the paper (App. B, M02) is silent, or contradicts itself (one a
 * The agent is the right arm, as in every episode of the paper, and acts with 7 numbers. The left arm is part of the
   scene: events move it by a law of memory and poses alone, so that an episode can be saved, restored and repeated. It
   types in its turn when the agent's hand is `MIN_CLEARANCE` beside the keyboard, then goes home to its own side. If the
-  agent comes back before the letter counts, the partner turns round and waits anew.
-* The partner pauses before each of its turns, for a time that the agent is not told. An agent whose hand stays beside
+  agent comes back before the letter counts, the partner turns round and waits again.
+* The partner pauses before each of its turns, for a time that is unknown to the agent. An agent whose hand stays beside
   the keyboard for `TURN_LIMIT` in its own turn has let its turn go by, and the episode ends. The paper has neither. The
   two close turn-taking by the clock, without a look at the partner or at the bold letters: the best fixed wait fits a
-  quarter of the turns, and in training there are two in a word. The partner's motion tells a turn, too.
+  quarter of the turns, and in training there are two in a word. The partner's motion reveals a turn, too.
 * A letter is typed when an arm touches its key, and no other, for `hold` without a break. A shorter touch is allowed.
   Holding a key that is not next, or the other's, or several at once ends the episode, and so does contact of the arms.
   A typed key must be released before it counts again.
 * The keyboard lies loose on the table: an arm that drags it moves the keys. The paper gives no lengths.
-* The agent is not told how long `hold` is. A letter that becomes bold shows that the press was long enough.
+* The agent does not know how long `hold` is. A letter that becomes bold shows that the press was long enough.
 """
 
 import math
@@ -124,7 +124,9 @@ class KeyboardTyping(Scenario):
         show_typed(world, "keyboard", k)
         key = self.key(world, k) if self.partner_next(world) and world.memory["waited"] > self.pause(k) else None
         counts = long_enough(world.memory["held_1"], self.hold)
-        partner.tell(keys.type_or_go_home(partner, self.keyboard, "keyboard", key, counts, PARTNER_HOME, self.pace))
+        partner.set_action(
+            keys.type_or_go_home(partner, self.keyboard, "keyboard", key, counts, PARTNER_HOME, self.pace)
+        )
 
     def _judge_press(self, world: World, key: int, arm: Arm) -> None:
         """Judge a key that counts: it is the next letter, and this arm's, or a mistake."""

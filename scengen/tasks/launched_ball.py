@@ -102,7 +102,8 @@ class LaunchedBall(Scenario):
         return inside and closed and world.touching(ROBOT, "ball")
 
     def mishandled(self, world: World) -> str | None:
-        """Reason why the first touch of the ball was no catch by a hand that waited for it, or None. Rules of ours."""
+        """Reason why the first touch of the ball was not a catch by a hand that waited for it, or None. Rules of
+        ours."""
         memory = world.memory
         if not memory["first_touch"]:
             return None
@@ -243,11 +244,11 @@ class LaunchedBall(Scenario):
 
 def way_at(ways: Sequence[Way], seconds: float) -> tuple[int, Way]:
     """Index of the way on which the ball is after a time [s], and the way."""
-    k = max(k for k, way in enumerate(ways) if way.begins <= seconds)
+    k = max(k for k, way in enumerate(ways) if way.starts <= seconds)
     return k, ways[k]
 
 
 def place_on(ways: Sequence[Way], seconds: float) -> Vec3:
     """Place of the ball after a time [m]."""
     _, way = way_at(ways, seconds)
-    return way.at + (seconds - way.begins) * way.velocity
+    return way.at + (seconds - way.starts) * way.velocity

@@ -180,7 +180,7 @@ class LinearIntercept(LaunchedBall):
         return plans
 
     def _go_to_it(self, world: World) -> Plan:
-        """Pick the ball at the place where it begins to roll."""
+        """Pick the ball at the place where it starts to roll."""
         yield from self.observe(world)
         yield from self.pick_at(world, world.com("ball"))
 

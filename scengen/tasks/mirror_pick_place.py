@@ -8,27 +8,27 @@
 
 Bottleneck: the camera frame is not the frame of the actions. The physics is easy: one cube, one grasp. A certificate
 therefore says that the cube can be lifted, and that a hand that goes where the picture shows the cube fails. It cannot
-say whether pictures tell enough, which is the same question in every scene.
+say whether pictures show enough, which is the same question in every scene.
 
 Decisions, where the paper (App. B, M01) is silent, and its text contradicts itself:
 
 * The orientation of pictures is a parameter of the scenario, `view`. It applies to every picture that a policy or a
   recording gets, and to no other: people see scenes upright. Actions, proprioception and privileged poses stay in world
-  axes. `seen_cube_pos` tells state-based policies what the picture suggests (`scengen.orientation`).
+  axes. `seen_cube_pos` gives state-based policies what the picture suggests (`scengen.orientation`).
 * App. B turns frames by 180 deg; App. J says in one place that they are flipped horizontally. Training uses the first,
   the other is an axis.
 * "Lift the cube to a small height": 4 cm above its place on the table, as in robosuite's Lift, held by the robot and by
   nothing else for 0.3 s, 30 steps as in the paper's T12 and T13. There is no other rule. The time limit of 12 s lets a
-  policy see the hand go the wrong way and turn back: noticing that is what the task asks for, so it is no bypass.
+  policy see the hand go the wrong way and turn back: noticing that is what the task asks for, so it is not a bypass.
 * A miss costs nothing but time. A hand that closes where the picture shows the cube, feels nothing, and goes to the
   opposite place lifts the cube at 8 s (12 of 12, on `flipped` with one more try 4 of 4). The task asks a policy to
-  notice the turned frame before or after a miss; a success does not tell which.
+  notice the turned frame before or after a miss; a success does not show which.
 * The cube stands at least 7 cm from the middle lines of the view: else some orientation shows it where it is.
 
-Axes. The paper has none. Those of `view` test the eye alone: memory, which has none, cannot tell them from training. Of
-the others, those of shape break a path that is kept relative to the cube: `small`, `long`, `high`. Nothing else about
-lifting one thing is hard. For the same reason plans that read poses instead of pictures, the adversary's random grasps
-among them, solve half of the scenes: the task's question does not arise for a policy that reads poses.
+Axes. The paper has none. Those of `view` test the eye alone: memory, which has none, cannot distinguish them from
+training. Of the others, those of shape break a path that is kept relative to the cube: `small`, `long`, `high`. Nothing
+else about lifting one thing is hard. For the same reason plans that read poses instead of pictures, the adversary's
+random grasps among them, solve half of the scenes: the task's question does not arise for a policy that reads poses.
 """
 
 import math

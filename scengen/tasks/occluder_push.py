@@ -7,8 +7,8 @@
 
                      [patch]
 
-Bottleneck: the colour of a cube is visible only once its lid is off, and nothing else tells the cubes apart. Releasing
-another cube on the patch loses the episode, so the robot must look before it brings a cube there.
+Bottleneck: the colour of a cube is visible only once its lid is off, and nothing else distinguishes the cubes.
+Releasing another cube on the patch loses the episode, so the robot must look before it brings a cube there.
 
 A lid is twice as wide as the jaw opens and lies flat, 25 mm above the table: it has nothing to grasp. It is pushed off
 its cube. The open jaw does that best: one finger on either side pushes the lid straight, and the cube passes between
@@ -353,7 +353,7 @@ class OccluderPush(Scenario):
         return next(apart, None)
 
     def push_start(self, i: int) -> Vec3:
-        """Place on the table where the push begins [m]."""
+        """Place on the table where the push starts [m]."""
         return self.foot(i) - (self.lid.width / 2 + APPROACH_DISTANCE) * self.directions[i]
 
     def swept(self, i: int, along: Vec3) -> Outline | None:

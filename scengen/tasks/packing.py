@@ -140,7 +140,7 @@ class Packing(Scenario):
         return Strict("a piece was tried in a second place") if moved else None
 
     def _elsewhere(self, world: World, i: int) -> bool:
-        """Whether piece `i` is in another place than at its first touch in the bin."""
+        """Whether piece `i` is in a different place than at its first touch in the bin."""
         shift, turn = off_first_pose(world, f"piece_{i}", i)
         return shift > self.unit or turn > MAX_TURN
 
@@ -213,7 +213,7 @@ class Packing(Scenario):
         }
 
     def _place_all(self, world: World, pose: Callable[[int], tuple[Vec3, float]]) -> Plan:
-        """Press each piece down softly at a pose and let go, wherever it comes to lie."""
+        """Press each piece down softly at a pose and let go, at whatever place results."""
         for i in range(self.count):
             lies = partial(self.lies, world, i)
             yield from fitting.lay(world.arm, f"piece_{i}", self.face(i), *pose(i), self.thickness, lies)

@@ -17,14 +17,14 @@ Decisions, where the paper (App. B, T11) says "grasp the bob at the swing apex" 
   a hand in the bob's way would succeed, or one that brakes the bob and then grasps it.
 * One try: a jaw that closes farther than the bob is wide has missed, and the episode is lost. Otherwise a jaw that
   opens and closes without looking would catch the bob after some time.
-* Two strict rules that the paper lacks. A jaw that begins to touch the bob was wide open, 65 mm, not longer ago than it
-  needs to close; and a jaw that was wide open and begins to close meets the bob in that time. Otherwise a jaw that was
+* Two strict rules that the paper lacks. A jaw that starts to touch the bob was wide open, 65 mm, not longer ago than it
+  needs to close; and a jaw that was wide open and starts to close meets the bob in that time. Otherwise a jaw that was
   opened 3 mm wider than the bob grasped it when it was seen to turn, without any lead, in 12 of 12; or a jaw could
-  begin to close at every swing and open again.
-* The lead is asked for, not the rhythm. A jaw that closes when the bob passes 24 deg on its way out grasps it in 12 of
-  12 of training and in 8 of 8 of `off_centre`, but in 0 of 8 of `wide_swing`, 3 of 8 of `small_bob` and 5 or 6 of 8 of
-  the other axes.
-* The pendulum swings already when the episode begins, at any moment of its period. If it always started at the end of a
+  start to close at every swing and open again.
+* The task requires the lead, not the rhythm. A jaw that closes when the bob passes 24 deg on its way out grasps it in
+  12 of 12 of training and in 8 of 8 of `off_centre`, but in 0 of 8 of `wide_swing`, 3 of 8 of `small_bob` and 5 or 6 of
+  8 of the other axes.
+* The pendulum swings already when the episode starts, at any moment of its period. If it always started at the end of a
   swing, as the paper may mean, one fixed time would serve every scenario. Either turning point counts; the arm reaches
   one.
 * The bob counts as grasped when it is between the pads of both fingers and as slow as the hand, for 0.3 s. It need not
@@ -65,8 +65,8 @@ MISS_SHARE = 0.9
 """Gap of a jaw that has closed on nothing, as a share of the bob's diameter. At 60 % a jaw that opened and closed
 without looking caught every fifth bob."""
 WIDE_GAP = 0.065
-"""Gap from which on a jaw is wide open [m]. An open jaw that is told to close for 50 ms, one step of a policy at 20 Hz,
-and to open again stays wider. A jaw kept at 46 or 54 mm grasped a bob that it saw turn; at 62 mm it was late."""
+"""Gap from which a jaw is wide open [m]. An open jaw that is commanded to close for 50 ms, one step of a policy at
+20 Hz, and to open again stays wider. A jaw kept at 46 or 54 mm grasped a bob that it saw turn; at 62 mm it was late."""
 MAX_BREAK = 0.2  # time for which pads may lose a bob that bounces between them [s]: longer than 0.09 s, see `jaw`
 HAND_TILT = 65.0
 """Angle of the hand below the horizontal [deg]. At 30 it would look along the bob's path, but below 60 it drifts away
@@ -104,7 +104,7 @@ class PendulumGrasp(Scenario):
         return scene
 
     def events(self, world: World) -> None:
-        """At the start, give the bob the speed from which it reaches the amplitude, whatever its angle.
+        """At the start, give the bob the speed from which it reaches the amplitude, at any angle.
 
         Remember when the jaw was wide open, when it touched the bob [s], and whether it has opened again without it.
         """
@@ -144,16 +144,16 @@ class PendulumGrasp(Scenario):
         return Strict("the jaw did not close from wide open") if self.narrow(world) else None
 
     def missed(self, world: World) -> bool:
-        """Whether a jaw that was wide open has begun to close and not met the bob in time. A rule of ours."""
+        """Whether a jaw that was wide open has started to close and has not touched the bob in time. A rule of ours."""
         memory = world.memory
         met = memory["touch"] > memory["wide"] or world.touching(ROBOT, BOB)
         late = world.time - memory["wide"] > self.closing_time
         return bool(memory["reopened"]) or (memory["wide"] > 0.0 and late and not met)
 
     def narrow(self, world: World) -> bool:
-        """Whether a jaw begins to touch the bob that was not wide open just before. A rule of ours."""
-        begins = world.touching(ROBOT, BOB) and world.time - world.memory["touch"] > MAX_BREAK
-        return begins and world.time - world.memory["wide"] > self.closing_time
+        """Whether a jaw starts to touch the bob that was not wide open just before. A rule of ours."""
+        starts = world.touching(ROBOT, BOB) and world.time - world.memory["touch"] > MAX_BREAK
+        return starts and world.time - world.memory["wide"] > self.closing_time
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -298,7 +298,7 @@ class PendulumGrasp(Scenario):
     # --- geometry -------------------------------------------------------------------------
 
     def _seen_at_start(self) -> str:
-        """Where the bob is at the start, in words; below the axle within 4 deg, where pictures do not tell the side."""
+        """Where the bob is at the start, in words; below the axle within 4 deg, where pictures do not show the side."""
         angle, _ = self.pendulum.swing(self.peak_angle, self.phase / 360.0)
         below = abs(angle) < math.radians(4.0)
         return "below the axle" if below else spoken(self.plane + (0.0 if angle > 0.0 else 180.0))

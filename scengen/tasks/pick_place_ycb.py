@@ -243,7 +243,7 @@ class PickPlaceYcb(Scenario):
             "near_over_size": self.near / self.patch.size,
             "size": self.patch.size,
             "mass": self.thing.mass,
-            **self.thing.told,
+            **self.thing.features,
         }
 
     def facts(self) -> Mapping[str, float | str]:

@@ -11,8 +11,9 @@ ball in the wrong bin ends the episode.
 
 Decisions, where the paper (App. B, T16) is silent:
 
-* "Color-dependent rolling trajectories separate red balls from blue balls": all balls roll alike, and the colour tells
-  which side to choose. Balls that roll differently by colour would need masses or frictions that cannot be seen.
+* "Color-dependent rolling trajectories separate red balls from blue balls": all balls roll alike, and the colour
+  decides which side to choose. Balls that roll differently by colour would need masses or frictions that cannot be
+  seen.
 * A crown separates the sides: two planes that lean away from a ridge. The ridge is visible, and is not always in the
   middle of the ramp.
 * The barrier keeps the hand from the bins and from the lower half of the ramp. A ball that is released above it falls

@@ -17,7 +17,7 @@ task asks for a torque balance, by trial or by feel.
 
 Decisions where the paper is silent (it gives the story, the 5 deg, the pivot offset and the mass of the beam):
 
-* All masses are hidden; blocks and beam look the same whatever they weigh. Visible facts may be used: geometry, and
+* All masses are hidden; blocks and beam look the same at any mass. Visible facts may be used: geometry, and
   which side is down. The oracle starts in the middle of the raised arm and learns only from tilts.
 * An obvious first place must not balance: the mirror image of the target's, and the one that follows if blocks that
   look alike weigh alike.
@@ -258,7 +258,7 @@ class SeesawBalance(Scenario):
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
-        """Checks of the arrangement whatever the masses, of the lever law against the free places, and of guesses."""
+        """Checks of the arrangement for any masses, of the lever law against the free places, and of guesses."""
         deck, lever = self.seesaw, abs(self.offset)
         far = deck.arm(1 if self.offset > 0 else -1) - self.target.width / 2 - DECK_MARGIN
         yield require(MIN_LEVER <= lever <= far, "the target has no room on its arm", offset=lever, farthest=far)

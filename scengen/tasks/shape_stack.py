@@ -2,7 +2,7 @@
 
                                             /\\
                                            |__|
-        __     /\\    ____    ____         |____|          the cone goes on top, wherever it stands
+        __     /\\    ____    ____         |____|          the cone goes on top, from any place
        |__|   |__|  |____|  |____|  ->    |____|
 
 Bottleneck: every shape must stand on the one below, with its centre of mass over it. Nothing stands on the cone
@@ -12,7 +12,7 @@ last, and each other shape must be placed over the middle of the one below.
 The shapes are a subset of the paper's five, each at most once: cube, cylinder, hexagonal and triangular prism, cone
 frustum. Decisions where the paper (App. B, T30) is silent:
 
-* A stack has one shape on each. Two shapes beside each other on a third, which a wide one supports, are no stack.
+* A stack has one shape on each. Two shapes beside each other on a third, which a wide one supports, are not a stack.
 * All shapes stand on a flat face at the start. The frustum is always among them: without it any order would do.
 * The frustum has a straight foot for the jaw and ends in a tip: with a wide face it would be a base like any other.
 * A shape that is released and topples loses the episode, and so does one that is set on the frustum, in the hand or
@@ -150,7 +150,7 @@ class ShapeStack(Scenario):
         yield from self.pile(world, [*flat, cone])
 
     def pile(self, world: World, order: Sequence[str], offset: float = 0.0) -> Plan:
-        """Put each shape on the one before it, with its middle offset from the other's towards the robot [m]."""
+        """Put each shape on the previous one it, with its middle offset from the other's towards the robot [m]."""
         for below, name in pairwise(order):
             yield from self.take(world, name)
             at = self.place_on(world, name, below) - [offset, 0.0, 0.0]

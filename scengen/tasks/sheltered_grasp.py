@@ -17,11 +17,11 @@ Decisions, where the paper (App. B, T03) is silent:
   to a jaw that cannot be aimed from above.
 * In training the rack is on the left of the table's middle and opens towards it. On the "opposite side" (App. I) rack
   and tray are mirrored: an object that is sheltered from the left can be reached only from the right.
-* "Initially not visible": no fixed camera sees any part of the object, in whatever scene; the camera on the hand may.
+* "Initially not visible": no fixed camera sees any part of the object in any scene; the camera on the hand may.
   From where `rgb_exo_left_cam` stands in robosuite, it would look into a rack on the right. Here it stands higher, and
   looks down on the roof of either rack. A scene in which any line of sight ends at the object is refuted.
-* The storey and the object's place in it are geometry, which no label tells: the robot must look into one storey, then
-  into the other. The paper calls this exploring. So there is no `answer`.
+* The storey and the object's place in it are geometry, which no label reveals: the robot must look into one storey,
+  then into the other. The paper calls this exploring. So there is no `answer`.
 * Exploring is looking. Without a strict rule of ours, closed fingers that sweep each storey drive the object to a place
   where the jaw takes it, blind (32 of 48). So the robot may not touch it in the rack more than 25 mm beside the hand.
   A blind jaw that tries three places of a storey, or of both, still finds it in 11 to 18 of 48 scenes, for the opening
@@ -106,7 +106,7 @@ class ShelteredGrasp(Scenario):
     """Distance of the object's front behind the open side, if it stands square in the rack."""
     item: int = param(0, "0 cube, 1 pudding box", 0, 1)
     yaw: float = param(0.0, "deg", -45.0, 45.0)
-    """Yaw of the object relative to the table, whatever the yaw of the rack."""
+    """Yaw of the object relative to the table, independent of the yaw of the rack."""
     tray_x: float = param(0.11, "m", -0.4, 0.4)
     tray_y: float = param(-0.08, "m", -0.4, 0.4)  # position of the tray, positive to the side of the rack
     rack: TierRack = TierRack()

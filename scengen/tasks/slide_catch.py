@@ -20,7 +20,7 @@ Decisions where the paper (App. B, T15) is silent:
   by 26 mm in training. After the right first block it may wait midway between the other two, if their lanes are
   neighbours, and follow the one that moves. Four of the six sequences allow that.
 * Once the ramp tilts, the bin may not be turned by more than 5 deg. The paper has no such rule. The bin is 85 mm before
-  the hand: a wrist that turned by 25 deg swung it by 45 mm in 0.2 s, from midway to every block that began to slide.
+  the hand: a wrist that turned by 25 deg swung it by 45 mm in 0.2 s, from midway to every block that started to slide.
   With a turn of 4 deg, at a slide seen by 0.5 mm, it caught all in 0 of 12 training draws, but 6 of 6 of `upper_first`.
 * The start of the tilt varies by more than the bin's time margin: a policy that moves at fixed times misses blocks.
 * Chance: training has all six sequences; one fixed answer is right in a sixth of it.
@@ -131,7 +131,7 @@ class SlideCatch(Scenario):
         return Strict("the bin tipped over") if world.tilt("bin") > math.radians(20.0) else None
 
     def turned(self, world: World) -> bool:
-        """Whether the ramp has begun to tilt, and the bin is not square to the lip."""
+        """Whether the ramp has started to tilt, and the bin is not square to the lip."""
         return world.time > self.start and abs(yaw_of(world.rot("bin"))) > MAX_BIN_TURN
 
     def caught(self, world: World, block: str, depth: float = 0.0) -> bool:
@@ -192,7 +192,7 @@ class SlideCatch(Scenario):
         yield from self.wait_at(world, self.y, lambda: not self.pending(world))
 
     def _react(self, world: World) -> Plan:
-        """Wait midway between the remaining lanes, and go to the block that begins to slide."""
+        """Wait midway between the remaining lanes, and go to the block that starts to slide."""
         yield from self.take(world)
         starts, remaining = {block: self.distance_up(world, block) for block in self.blocks}, list(self.blocks)
         while remaining:

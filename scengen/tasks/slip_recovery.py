@@ -13,13 +13,13 @@ and "sliding the object is not allowed":
 
 * Transport means: carried at least `MIN_LIFT` above where the object stood. An object 1 cm above the table stays
   between the fingers when they open, and is held again when they close. From `MIN_LIFT` it is lost: a jaw that points
-  down holds an object at most 31 mm below its highest point, where the palm begins, and its tips end 9 mm below. Once
+  down holds an object at most 31 mm below its highest point, where the palm starts, and its tips end 9 mm below. Once
   the object has fallen by the sum, its top is below the tips. The slip comes at a distance from the place where the
   object was first so high, seen from above, and no goal counts before it, so creeping along lower or letting the slip
   happen on the spot gains nothing. The distance is hidden and has a wide range, and the object's narrow side is along
   the way: a hand that comes down blindly where objects fall on average comes down beside it or on it, and there is no
   time for a second attempt.
-* During the window the gripper is open whatever the command, and obeys afterwards. The window lasts longer than the
+* During the window the gripper ignores its command and is open; afterwards it obeys. The window lasts longer than the
   fall; scenarios with shorter ones are refuted.
 * A strict rule that the paper lacks: the episode is lost if the robot touches the object at the end of a slip, unless
   the object has lain on the table untouched in the meantime. A hand on its side, with one finger below the object,
@@ -76,9 +76,10 @@ MAX_FLIGHT_DISTANCE = 0.03  # distance that is allowed for this flight [m]
 MIN_CARRY_DISTANCE = 0.015
 """Least distance that the object is carried before a slip, and that remains after the last one [m]."""
 MEMORY = ("slips", "jam_ends", "lost", "kept", "stood", "high", "high_x", "high_y", "recovered")
-"""Number of slips and end of the present one; whether the object has lain on the table untouched since the slip began,
-and whether the hand kept it through one; height of the object's centre of mass at the last contact with the table [m];
-whether it is carried high enough to slip, and since which place [m]; whether it has been so since the last slip."""
+"""Number of slips and end of the present one; whether the object has lain on the table untouched since the slip
+started, and whether the hand kept it through one; height of the object's centre of mass at the last contact with the
+table [m]; whether it is carried high enough to slip, and since which place [m]; whether it has been so since the last
+slip."""
 PUSHES = ("pushed", "slid", "x", "y")
 """Whether the object lies where the robot pushed it, the total distance of the pushes, its place one period ago [m]."""
 
@@ -172,7 +173,7 @@ class SlipRecovery(Scenario):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Pick the object up and carry it; if the hand is empty, find the object and begin again; put it down."""
+        """Pick the object up and carry it; if the hand is empty, find the object and start again; put it down."""
         while True:
             yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
             yield from self.bring(world)
@@ -322,7 +323,7 @@ class SlipRecovery(Scenario):
             "longest_slip": max((slip.seconds for slip in self.planned), default=0.0),
             "way": way,
             "mass": self.thing.mass,
-            **self.thing.told,
+            **self.thing.features,
             "narrow_side_along_the_way": abs(float(side)) / math.dist(self.start, self.goal),
         }
 

@@ -130,7 +130,7 @@ class Trial:
         return Check(name, None if waived else not reason, reason, settings, numbers)
 
     # Each check returns its settings, its numbers, and the reason of its failure: empty if it passed, and one that
-    # begins with `NOT_CHECKED` if there is nothing to check.
+    # starts with `NOT_CHECKED` if there is nothing to check.
 
     def _feasible(self) -> "Finding":
         """Constraints of the family. Numbers of a feasible scenario are the features that its physics depends on."""
@@ -345,8 +345,8 @@ def _outcome(episode: Rollout) -> dict[str, Any]:
 
 def _outcome_of_shortcut(tried: Rollout) -> dict[str, Any]:
     """Like `_outcome`. A shortcut that gave up, and was not stopped by a failure, counts as not tried."""
-    told = _outcome(tried)
-    return {**told, "outcome": NOT_TRIED} if tried.gave_up and tried.outcome == "timeout" else told
+    outcome = _outcome(tried)
+    return {**outcome, "outcome": NOT_TRIED} if tried.gave_up and tried.outcome == "timeout" else outcome
 
 
 def _angle(a: np.ndarray, b: np.ndarray) -> float:

@@ -97,8 +97,8 @@ def _imports(name: str, path: Path) -> tuple[str, ...]:
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            told = "." * node.level + (node.module or "")
-            base = importlib.util.resolve_name(told, package) if node.level else told
+            module = "." * node.level + (node.module or "")
+            base = importlib.util.resolve_name(module, package) if node.level else module
             found += [base, *(f"{base}.{alias.name}" for alias in node.names)]
     return tuple(found)
 
@@ -145,8 +145,8 @@ def _plain(node: object) -> object:
     if isinstance(node, ast.JoinedStr):  # Python 3.12.1 adds empty texts to some
         return ["JoinedStr", [_plain(v) for v in node.values if not (isinstance(v, ast.Constant) and v.value == "")]]
     if isinstance(node, ast.AST):
-        told = [(name, _plain(value)) for name, value in ast.iter_fields(node) if value is not None and value != []]
-        return [type(node).__name__, told]
+        parts = [(name, _plain(value)) for name, value in ast.iter_fields(node) if value is not None and value != []]
+        return [type(node).__name__, parts]
     return [_plain(each) for each in node] if isinstance(node, list) else repr(node)
 
 

@@ -33,7 +33,7 @@ def needed(family: type[Scenario], made: Mapping[str, str]) -> dict[str, str]:
     Args:
         made: the versions of a manifest, which take precedence.
     """
-    named = {name: told for name, told in made.items() if name not in ("scengen", "platform")}
+    named = {name: version for name, version in made.items() if name not in ("scengen", "platform")}
     return dict(sorted({**packages(family), **named}.items(), key=lambda item: item[0].lower()))
 
 
@@ -51,7 +51,7 @@ def lock_text(
         f"processor {binding.get_host_cpu_name()}: {able}",
         f"rounds as {fingerprint}",
     ]
-    lines = [f"{name}=={told}" for name, told in needed(family, versions).items() if _installed(name)]
+    lines = [f"{name}=={version}" for name, version in needed(family, versions).items() if _installed(name)]
     return "\n".join([*(f"# {line}" for line in about), *lines]) + "\n"
 
 
@@ -70,13 +70,13 @@ def lock_of_run(folder: Path, family: type[Scenario], made: Mapping[str, Any]) -
         made: entries of `labels.made_with` of the run.
 
     Raises:
-        PoolError: the run is continued with other packages than it was begun with.
+        PoolError: the run is continued with other packages than it was started with.
         BadConfig: the file cannot be written.
     """
     begun, here = read_lock(folder), needed(family, made["versions"])
     if begun is None:
         write(folder / LOCK_FILE, lock_text(family, **made))
-    elif other := [f"{name} {told}" for name, told in begun.items() if here.get(name) != told]:
+    elif other := [f"{name} {version}" for name, version in begun.items() if here.get(name) != version]:
         install = f"pip install --no-deps -r {folder / LOCK_FILE}"
         raise PoolError(f"{folder} was begun with {', '.join(other)}; {install}, or choose another pool=")
     return (folder / LOCK_FILE).read_text()
@@ -107,8 +107,8 @@ def read_lock(folder: Path) -> dict[str, str] | None:
 
 
 def differing(locked: Mapping[str, str], here: Mapping[str, str]) -> dict[str, str]:
-    """Packages that a file names in another version than `here` has, with the version that the file names."""
-    return {name: told for name, told in locked.items() if here.get(name, told) != told}
+    """Packages that a file names in a different version than `here` has, with the version that the file names."""
+    return {name: version for name, version in locked.items() if here.get(name, version) != version}
 
 
 def unneeded(locked: Mapping[str, str], here: Mapping[str, str]) -> list[str]:

@@ -22,7 +22,7 @@ def play(what: Played) -> None:
     world.reset()
     with suppress(Unstable):  # later uses of the scene meet it again
         for action in actions:
-            world.apply(action)
+            world.step_filtered(action)
 
 
 def stored_world(row: SceneRow, visual: bool = False) -> World:

@@ -275,7 +275,7 @@ class Crew:
             function: the pickled function.
             count: number of workers; None for one on each core.
             announced: see `Nodes`.
-            report: told the number of nodes and workers, in words.
+            report: called with the number of nodes and workers, in words.
         """
         self._ray, self._count, self._report = ray, count, report
         reference = ray.put(function)

@@ -44,5 +44,5 @@ def factory_of(setting: str, name: str) -> Callable[..., Any]:
 
 def at_fault(setting: str, name: str, what: str, error: Exception) -> ForeignCode:
     """The error for a fault of a user's code."""
-    told = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
-    return ForeignCode(f"{setting} = {cut(name)}; {what} ({told}); the fault is the {setting}'s")
+    message = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
+    return ForeignCode(f"{setting} = {cut(name)}; {what} ({message}); the fault is the {setting}'s")

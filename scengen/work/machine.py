@@ -1,4 +1,4 @@
-"""What the operating system tells about processes, and the limits that it enforces. Linux has all of it.
+"""Readings of processes from the operating system, and the limits that it enforces. Linux has all of it.
 
 Elsewhere a worker's processor time is taken for the time on the clock, its memory has no limit, and it does not end
 with a parent that is killed. None of this was tried on macOS or Windows.
@@ -22,7 +22,7 @@ except ImportError:  # Windows
     resource: Any = None
 
 LINUX = sys.platform == "linux"
-"""Whether processes can be measured and limited, and be copied instead of started anew."""
+"""Whether processes can be measured and limited, and be forked instead of spawned."""
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
 """File with the processor time of a container: microseconds in a period of microseconds, or `max`."""
 _PR_SET_PDEATHSIG = 1
@@ -148,7 +148,7 @@ class _Bounding:
 
     def leave(self) -> None:
         with self._lock:
-            if self._inside:  # a process that began within a statement has left it already
+            if self._inside:  # a process that started within a statement has left it already
                 self._inside -= 1
                 if not self._inside:
                     resource.setrlimit(resource.RLIMIT_AS, self._before)

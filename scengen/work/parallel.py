@@ -117,7 +117,7 @@ def each(
 
 
 def apart(function: Callable[[A], B], item: A, limits: Limits, what: str) -> B:
-    """Apply a function to one item, in a process of its own that is ended at a limit.
+    """Apply a function to one item, in a separate process that is ended at a limit.
 
     Args:
         what: description of the work, for the error: `filming 8ed4a4577fe0`.
@@ -145,7 +145,7 @@ def made_of_lost(item: A, reason: str, lost: Callable[[A, str], B] | None) -> B:
 
 
 _END: Any = object()
-"""Sentinel that is no item."""
+"""Sentinel that is not an item."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class _Worker:
         self._item, self._tries, self.busy = None, 0, False
         self.deadline = float("inf")
         """Time of the next look at the processor time that the item has used [s]."""
-        self._begun, self._looked, self._used = 0.0, 0.0, 0.0
+        self._cpu_at_start, self._looked, self._used = 0.0, 0.0, 0.0
         """Processor time at the beginning of the item, time of the last look, and processor time then [s]."""
         self.connection: Connection
 
@@ -212,13 +212,13 @@ class _Worker:
         """Whether the item has used its processor time, or has used none since the last look. Otherwise there will be
         another look."""
         now, (used, stopped) = time.monotonic(), self._processor_time()
-        if used - self._begun >= seconds:
+        if used - self._cpu_at_start >= seconds:
             return True
         suspended = stopped or now > self.deadline + MAX_LATENESS  # the latter: this process was
         if not suspended and used - self._used < MIN_SHARE * (now - self._looked):
             return True
         self._looked, self._used = now, used
-        self.deadline = now + max(seconds - (used - self._begun), MIN_LOOK)
+        self.deadline = now + max(seconds - (used - self._cpu_at_start), MIN_LOOK)
         return False
 
     def end(self) -> None:
@@ -240,7 +240,7 @@ class _Worker:
         with suppress(OSError):  # it has died, which the answer shows
             self.connection.send(self._item)
         self._looked = time.monotonic()
-        self._begun = self._used = self._processor_time()[0]
+        self._cpu_at_start = self._used = self._processor_time()[0]
         self.deadline = self._looked + (self._limits.seconds if self._limits else float("inf"))
 
     def _start(self) -> None:

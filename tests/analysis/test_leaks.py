@@ -58,4 +58,4 @@ def test_the_command_prints_leaks(monkeypatch, capsys, tmp_path):
     assert "target.mass" in [leak["parameter"] for leak in json.loads(target.read_text())["leaks"]["found"]]
     told = capsys.readouterr()
     assert "hidden parameters in 60 draws of id: observations tell" in told.out
-    assert "LEAK" in told.err and "tells target.mass: explained variance" in told.err
+    assert "LEAK" in told.err and "reveals target.mass: explained variance" in told.err

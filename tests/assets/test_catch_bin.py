@@ -45,7 +45,7 @@ def test_three_blocks_on_top_of_each_other_are_below_the_rim():
 
 
 def test_the_hand_that_holds_it_is_out_of_the_way_of_what_falls_in():
-    """The palm ends before the inside begins by the thickness of the wall, or stays above the rim."""
+    """The palm ends before the inside starts by the thickness of the wall, or stays above the rim."""
     assert BIN.handle[2] + PALM_ABOVE > BIN.rim + 0.015
     assert BIN.handle[0] + PALM_ACROSS < -BIN.width / 2 + 0.001
     assert pinch(BIN.grip) > 20.0

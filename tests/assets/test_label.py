@@ -63,7 +63,7 @@ def test_print_neither_weighs_nor_touches_and_stands_out_by_two_layers_at_most(i
 
 @ALL
 def test_a_word_is_read_from_left_to_right_from_both_sides(item):
-    """Seen from outside, with up upwards, each letter is to the right of the one before."""
+    """Seen from outside, with up upwards, each letter is to the right of the previous one."""
     model = scene(item.prop).compile()
     for side in ("front", "back"):
         spots = [model.geom(f"thing/{side}_{k}_0").pos for k in range(len(item.prop.label.word))]

@@ -54,7 +54,7 @@ def test_the_period_is_that_of_the_textbook(length, degrees, seconds):
 
 
 def test_it_swings_on_undamped():
-    """After 10 s it still comes to within a thousandth of where it began."""
+    """After 10 s it still comes to within a thousandth of where it started."""
     angles = Swing(Pendulum(angle=0.5)).angles(10.0)
     assert angles[-1000:].max() == pytest.approx(0.5, rel=1e-3) == -angles[-1000:].min()
 

@@ -85,7 +85,7 @@ def probed(solid, spots, radius):
 @pytest.mark.parametrize("solid", ALL + HANDLED, ids=name)
 @pytest.mark.parametrize("over", [False, True], ids=["upright", "upside down"])
 def test_left_alone_it_stands_still(solid, over):
-    """1 mm of drift is what a certificate allows; a hundredth of that is asked for here."""
+    """1 mm of drift is what a certificate allows; a hundredth of that is requested here."""
     model, data = on_table(solid, (0, 1, 0, 0) if over else (1, 0, 0, 0), solid.height if over else 0.0)
     mujoco.mj_step(model, data, 500)
     before = data.qpos.copy()

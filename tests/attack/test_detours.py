@@ -21,7 +21,7 @@ def refused(player, task, played):
 
 
 def solving(player, kind):
-    """The attempts that reach the goal of the open task, of those that begin with a kind of move or contain it."""
+    """The attempts that reach the goal of the open task, of those that start with a kind of move or contain it."""
     attempts = [one for one in detours(player) if any(macro.kind == kind for macro in one.macros)]
     assert attempts and all(one.tier == DETOUR for one in attempts)
     for attempt in attempts[:6]:

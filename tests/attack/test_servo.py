@@ -10,7 +10,7 @@ from hands.linear_intercept import unmended
 from scengen.attack.adversary import Attack
 from scengen.attack.player import Player
 from scengen.attack.retries import retries
-from scengen.attack.servo import SERVO, asked_of, moving, servo
+from scengen.attack.servo import SERVO, moving, must_touch, servo
 from scengen.compose import load_task
 from scengen.sim.world import World
 from scengen.validate.rebuilt import rebuild
@@ -58,7 +58,7 @@ def test_only_bodies_that_move_by_themselves_are_chased(rolling):
 
 def test_what_the_goal_asks_a_body_to_touch_is_touched_first():
     player = player_of("ramp_sort")
-    assert player.latches >= {(f"ball_{i}", "ramp") for i in range(4)} and asked_of(player, "ball_0") == ("ramp",)
+    assert player.latches >= {(f"ball_{i}", "ramp") for i in range(4)} and must_touch(player, "ball_0") == ("ramp",)
     ways = [[(macro.kind, len(macro.numbers)) for macro in attempt.macros] for attempt in servo(player)]
     place, straight = ([("pick", 4), ("touch", count), ("bring", 7)] * 4 for count in (3, 0))
     assert place in ways and straight in ways
@@ -67,7 +67,7 @@ def test_what_the_goal_asks_a_body_to_touch_is_touched_first():
 @pytest.mark.slow
 def test_where_the_goal_asks_for_no_touch_none_is_made():
     player = player_of("mass_sort")
-    assert not any(asked_of(player, body) for body in player.trace.handled)
+    assert not any(must_touch(player, body) for body in player.trace.handled)
     assert not [a for a in servo(player) if "touch" in [macro.kind for macro in a.macros]]
 
 
@@ -93,7 +93,7 @@ def test_a_suction_cup_carries_a_body_to_where_the_witness_leaves_it():
     player = player_of("cracker_box_suction")
     attempts = list(servo(player))
     assert {macro.kind for attempt in attempts for macro in attempt.macros} == {"pick", "along", "bring", "touch"} - (
-        set() if asked_of(player, "box") else {"touch"}
+        set() if must_touch(player, "box") else {"touch"}
     )
     attempt = next(one for one in attempts if [macro.kind for macro in one.macros] == ["pick", "bring"])
     player.play(attempt.macros, raw=False)

@@ -208,7 +208,7 @@ def scenario_id(family: str, params: dict[str, Any]) -> str:
 
 
 def write_table(path: Path, table: pa.Table, **options: Any) -> None:
-    """Write a shard as scengen does, unless other options are asked for."""
+    """Write a shard as scengen does, unless other options are requested."""
     usual = {"compression": "zstd", "compression_level": 3, "row_group_size": 1000, "write_page_checksum": True}
     pq.write_table(table, path, **{**usual, **options})
 

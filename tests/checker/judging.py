@@ -68,7 +68,7 @@ class Outcome:
 
 
 def attempt(case: Case, pool: Path, checker: str) -> Outcome:
-    """Let a checker judge one pool in a process of its own."""
+    """Let a checker judge one pool in a separate process."""
     before = _listing(pool)
     with tempfile.TemporaryDirectory() as scratch:
         here, told = Path(scratch, "here"), Path(scratch, "told")

@@ -58,7 +58,7 @@ _ENTRY = {"file": "hits/a.npz", "sha256": "0" * 64}
 
 
 def _hit(make: Callable[[Path], None]) -> Callable[[Path], None]:
-    """A file in the place of a hit that the manifest lists, with a hash to match."""
+    """A file in place of a hit that the manifest lists, with a hash to match."""
 
     def damage(folder: Path) -> None:
         path = folder / "hits" / "a.npz"
@@ -87,7 +87,7 @@ HITS: dict[str, tuple[str, Callable[[Path], None]]] = {
     "of_endless_time": (r"not a hit.*seconds", _npz(seconds=1e300)),
     "of_another_scenario": (r"hit", _npz(params={"count": 5})),
 }
-"""What stands in the place of a hit."""
+"""What stands in place of a hit."""
 
 
 CHANGES: dict[str, tuple[str, str, Change]] = {

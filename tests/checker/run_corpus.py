@@ -90,7 +90,7 @@ def put(checker: str, chosen: Iterable[Case], pools: Path, progress: Callable[[O
 
 
 def _apart(work: Callable[[], None]) -> None:
-    """Do something in a process of its own: what it has used of the memory does not come back."""
+    """Do something in a separate process: what it has used of the memory does not come back."""
     child = os.fork()
     if child == 0:
         try:

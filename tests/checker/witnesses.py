@@ -66,7 +66,7 @@ def _unfiltered(draft: Draft) -> None:
     actions = []
     for action in scenario.oracle(world):
         actions.append(np.asarray(action, np.float32))
-        world.apply(actions[-1])
+        world.step_filtered(actions[-1])
         if scenario.success(world):
             break
     draft.played(np.array(actions, np.float32))

@@ -67,7 +67,7 @@ def test_a_pool_that_is_not_the_one_of_the_index_is_refused(folder, tmp_path, ca
         (changed / name).symlink_to(folder / name)
     index["pools"]["id"]["sha256"] = "0" * 64
     (changed / collection.INDEX).write_text(json.dumps(index))
-    with pytest.raises(PoolError, match="id has another hash than"):
+    with pytest.raises(PoolError, match="id has a different hash than"):
         collection.members(changed)
 
 

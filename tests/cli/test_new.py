@@ -45,7 +45,7 @@ def test_the_entry_point_names_the_folder_of_the_task_file(written):
 
 @pytest.mark.parametrize("which", ["not certified", pytest.param("certified", marks=pytest.mark.slow)])
 def test_its_tests_pass(written, which):
-    """In a process of their own, from its folder, as its README says; certificates under `make slow`."""
+    """In a separate process, from its folder, as its README says; certificates under `make slow`."""
     env = {**os.environ, "PYTHONPATH": str(Path(scengen.__file__).parents[1])}
     argv = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", which)
     done = subprocess.run(argv, cwd=written, env=env, capture_output=True, text=True)

@@ -63,7 +63,7 @@ def paths(world: World, actions: NDArray[np.float32]) -> NDArray[np.float64]:
     world.reset()
     found = []
     for action in actions:
-        world.apply(action)
+        world.step_filtered(action)
         found.append([arm.joint_pos for arm in world.arms])
     return np.array(found)
 
@@ -107,7 +107,7 @@ def test_reset_restore_and_replay_give_the_same_bits(embodiment: str) -> None:
     fresh.restore(middle)
     np.testing.assert_array_equal(fresh.state(), middle)
     for action in actions[70:]:
-        fresh.apply(action)
+        fresh.step_filtered(action)
     np.testing.assert_array_equal(fresh.state(), end)
     world.reset()
     world.loop.replay(actions)
@@ -130,32 +130,32 @@ def test_the_state_holds_the_filters_and_grippers_of_both_arms(pair: World) -> N
 # --- an arm of the scene's own ------------------------------------------------------------
 
 
-def test_an_arm_that_is_told_moves_as_one_that_actions_drive(pair: World) -> None:
+def test_a_scripted_arm_moves_like_one_that_actions_drive(pair: World) -> None:
     pair.reset()
     driven = scene("panda_jaw+scripted_panda_jaw")
     assert [arm.label for arm in (*driven.arms, *driven.partners)] == ["robot0", "robot1"] and driven.size == 7
-    for own, told in zip(waving(), down(), strict=True):
-        pair.apply(np.concatenate([own, told]))
+    for own, partner in zip(waving(), down(), strict=True):
+        pair.step_filtered(np.concatenate([own, partner]))
         with driven.events():
-            driven.partners[0].tell(told)
-        driven.apply(own)
+            driven.partners[0].set_action(partner)
+        driven.step_filtered(own)
     assert driven.digest == pair.digest and driven.touched("robot1", "left")
 
 
-def test_what_an_arm_is_told_holds_for_one_period_and_only_events_may_tell_it() -> None:
+def test_a_scripted_action_holds_for_one_period_and_only_events_may_set_it() -> None:
     world = scene("panda_jaw+scripted_panda_jaw")
     (partner,) = world.partners
     for event in ([1.0] * 7, None):
         with world.events():
             if event:
-                partner.tell(event)
-        np.testing.assert_array_equal(world.joined(np.zeros(7))[7:], event or IDLE)
-    with pytest.raises(NoEvent, match="telling robot1"):
-        partner.tell(IDLE)
+                partner.set_action(event)
+        np.testing.assert_array_equal(world.with_partner_actions(np.zeros(7))[7:], event or IDLE)
+    with pytest.raises(NoEvent, match="setting the action of robot1"):
+        partner.set_action(IDLE)
     with world.events(), pytest.raises(UnknownName, match="'robot0'"):
-        world.arm.tell(IDLE)
+        world.arm.set_action(IDLE)
     with pytest.raises(ValueError, match=r"shape \(7,\)"):
-        world.apply(np.zeros(14, np.float32))
+        world.step_filtered(np.zeros(14, np.float32))
 
 
 # --- contacts -----------------------------------------------------------------------------
@@ -164,7 +164,7 @@ def test_what_an_arm_is_told_holds_for_one_period_and_only_events_may_tell_it() 
 def test_contacts_are_latched_for_each_arm_and_for_the_robot(pair: World) -> None:
     pair.reset()
     for action in np.hstack([down(), PARKED]):
-        pair.apply(action)
+        pair.step_filtered(action)
     assert pair.touched("robot0", "right") and pair.touched(ROBOT, "right")
     assert not pair.touched("robot1", "right") and not pair.touched(ROBOT, "left")
     assert pair.touching_bodies("right") >= {ROBOT} and "robot0" not in pair.touching_bodies("right")
@@ -210,7 +210,7 @@ def test_a_cup_pulls_by_its_own_pads_alone() -> None:
     press[:, 6] = wait[:, 6] = 1.0
     pulled = []
     for action in np.hstack([press, wait]):
-        world.apply(action)
+        world.step_filtered(action)
         pulled.append([arm.sealed for arm in world.arms])
     assert np.array(pulled)[:, 0].any() and not np.array(pulled)[:, 1].any()
 
@@ -233,7 +233,7 @@ def test_names_of_robots_are_lists_of_hands() -> None:
 def test_actions_of_another_shape_are_refused_and_change_nothing(pair: World, shape: tuple[int, ...]) -> None:
     pair.reset()
     before = pair.state()
-    for play in (pair.step, pair.apply, pair.loop.step):
+    for play in (pair.step, pair.step_filtered, pair.loop.step):
         with pytest.raises(ValueError, match=r"shape \(14,\)"):
             play(np.zeros(shape))
     with pytest.raises(ValueError, match=r"shape \(n, 14\)"):

@@ -95,7 +95,7 @@ def test_the_bytes_do_not_depend_on_workers_or_interruptions(made, tmp_path, wor
 
 
 def test_other_settings_do_not_continue_a_run(made):
-    with pytest.raises(PoolError, match="was begun with other settings .*seed.*; choose another to="):
+    with pytest.raises(PoolError, match="was started with other settings .*seed.*; choose another to="):
         make(made, seed=7)
 
 

@@ -1,4 +1,4 @@
-"""The drift matrix: verdicts of a pool under several versions of MuJoCo, each in an environment of its own."""
+"""The drift matrix: verdicts of a pool under several versions of MuJoCo, each in a separate environment."""
 
 import json
 import venv

@@ -144,7 +144,7 @@ def test_the_filter_of_people_and_oracles_is_there_on_request():
     for action_filter in (None, "teleop"):
         env = PoolEnv("domino_single", REFERENCE, action_filter=action_filter)
         env.reset(seed=0)
-        with mock.patch.object(env.world, "apply", side_effect=lambda action: asked.append(action.tolist())):
+        with mock.patch.object(env.world, "step_filtered", side_effect=lambda action: asked.append(action.tolist())):
             env.step(jerk)
     assert asked == [jerk.tolist(), [pytest.approx(LARGEST_CHANGE), 0, 0, 0, 0, 0, -1.0]]
 

@@ -38,12 +38,12 @@ def flight():
     state, world = state_of(load_task(row.task)), World.load(row.scene_xml)
     reach = np.array([1, -1, 1, 1, 1, 1, -1], np.float32)
     for _ in range(20):
-        world.apply(reach)
+        world.step_filtered(reach)
     with world.events():
         world.launch("slab", [0.1, 0.2, 3.0], [1.0, 2.0, 3.0])
-    world.apply(reach)
+    world.step_filtered(reach)
     before = state.read(world)
-    world.apply(reach)
+    world.step_filtered(reach)
     return state, world, state.read(world), before
 
 

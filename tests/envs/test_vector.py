@@ -54,7 +54,7 @@ def test_what_many_simulations_hold_is_what_is_read_of_each(task):
     world = world_of(known.draw(ID, 0, 0).scenario, known.embodiment)
     for wiggle in (0.5, -0.5):
         for _ in range(20):
-            world.apply(np.full(14, wiggle, np.float32))
+            world.step_filtered(np.full(14, wiggle, np.float32))
         for stream in (streams := streams_of(known.embodiment)).values():
             if stream.view:
                 held = np.array([stream.view(world)] * 2)
@@ -235,7 +235,7 @@ def test_a_simulation_that_becomes_unstable_ends_its_episode(monkeypatch):
 
     envs, env = PoolVectorEnv("domino_single", REFERENCE, 2), PoolEnv("domino_single", REFERENCE)
     envs.reset(seed=0), env.reset(seed=0)
-    monkeypatch.setattr(World, "apply", unstable)
+    monkeypatch.setattr(World, "step_filtered", unstable)
     *_, terminated, truncated, infos = envs.step(np.zeros((2, 7)))
     assert terminated.all() and not truncated.any() and not infos["success"].any()
     assert [*infos["reason"]] == ["MuJoCo raised a warning"] * 2

@@ -1,4 +1,4 @@
-"""A policy server in a process of its own, written against the protocols and not against scengen's client.
+"""A policy server in a separate process, written against the protocols and not against scengen's client.
 
     python policy_server.py openpi|gr00t ACTIONS.npy LOG.json [FAULT]
 
@@ -32,7 +32,7 @@ class Policy:
     def __init__(self, actions, log, fault):
         self.actions, self.log, self.fault = np.load(actions).astype(np.float32), log, fault
         self.asked = self.next = self.pending = self.most = 0
-        self.lock = threading.Lock()  # each connection has a thread of its own
+        self.lock = threading.Lock()  # each connection has a separate thread
 
     def chunk(self, observation):
         with self.lock:

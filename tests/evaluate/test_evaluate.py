@@ -176,7 +176,7 @@ def test_a_policy_of_ones_own_is_found_in_the_working_directory(tmp_path, monkey
         (("policy=orakel",), "did you mean 'oracle'"),
         (("policy=nowhere:Policy",), "there is no module 'nowhere'"),
         (("policy=math:sinus",), "math has no function or class named 'sinus'"),
-        (("policy=idle", "seeds=7"), "holds 6 scenarios; say seeds=6"),
+        (("policy=idle", "seeds=7"), "holds 6 scenarios; pass seeds=6"),
         (("policy=idle", "rollouts=0"), "rollouts = 0; it must be at least 1"),
         (("policy=idle", "action_repeat=0"), "action_repeat = 0; it must be a whole number of control periods"),
         (("policy=oracle", "action_repeat=4"), "action_repeat = 4; policy oracle acts at 100 Hz: leave it out"),
@@ -368,7 +368,7 @@ def test_the_papers_splits_are_training_and_the_papers_conditions(monkeypatch, t
         assert rollouts._is_wanted("domino_single", split, "all", ())
     assert rollouts._paper_axes("domino_single", ()) == (paper["domino_single"],)
     monkeypatch.setattr(rollouts, "_is_wanted", lambda *_: False)
-    with pytest.raises(BadConfig, match="these pools have none of them, but id; say splits=all"):
+    with pytest.raises(BadConfig, match="these pools have none of them, but id; pass splits=all"):
         run(tmp_path, "idle", splits="paper")
 
 

@@ -167,7 +167,7 @@ def test_a_server_with_other_names_is_refused(serve, client, tmp_path):
 def test_episodes_of_unknown_weights_are_not_mixed(serve, client, tmp_path):
     address, file = serve("gr00t"), client("gr00t")
     play(address, file, tmp_path / "out")
-    with pytest.raises(Exception, match="does not say which weights it serves; say fresh=true"):
+    with pytest.raises(Exception, match="does not say which weights it serves; pass fresh=true"):
         play(address, file, tmp_path / "out", rollouts=2)
     play(address, file, tmp_path / "named", version="step 1000")
     assert len(play(address, file, tmp_path / "named", version="step 1000", rollouts=2)) == 2

@@ -5,7 +5,7 @@
 N one-point changes of `rules` or of `plans` are chosen at random among all families: a number times 1.02 or 1.3, a
 comparison inverted, a
 condition that is never true, `and` for `or`. They lie in the rules (`success`, `failure`, `events`, `build`,
-`constraints` and the methods that these use), or in plans. Each is applied in a process of its own, and the task is
+`constraints` and the methods that these use), or in plans. Each is applied in a separate process, and the task is
 compared with its file, cheap parts first. The result is one JSON line for each change in generated/mutants.jsonl.
 """
 
@@ -172,7 +172,7 @@ def judged(mutant: Mutant) -> dict[str, Any]:
 
 
 def apart(mutant: Mutant) -> dict[str, Any]:
-    """Judge a change in a process of its own."""
+    """Judge a change in a separate process."""
     reader, writer = os.pipe()
     if (child := os.fork()) == 0:
         os.close(reader)

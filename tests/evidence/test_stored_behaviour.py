@@ -16,7 +16,7 @@ from helpers import of_stored_pools
 from scengen import list_tasks, load_task
 from scengen.episode import Episode
 from scengen.evidence import comparison, episodes, rules
-from scengen.evidence.behaviour import FORMAT, SEED, Behaviour, asked, is_core, packed, unpacked
+from scengen.evidence.behaviour import FORMAT, SEED, Behaviour, current_rules, is_core, packed, unpacked
 from scengen.evidence.comparison import compare, merged, same_machine
 from scengen.evidence.edges import Edge
 from scengen.evidence.rollouts import Stage
@@ -238,7 +238,7 @@ def test_rules_say_the_same_whenever_they_are_asked(task):
     """Whatever a probe changes, it sets back."""
     before = stored(task.name)
     stage = Stage(task.draw("id", SEED, 0).scenario, task.embodiment, task.horizon)
-    once, again = asked(stage, before), asked(stage, before)
+    once, again = current_rules(stage, before), current_rules(stage, before)
     assert once == again == {name: getattr(before, name) for name in once}
 
 

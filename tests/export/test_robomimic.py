@@ -73,7 +73,7 @@ def test_states_are_those_of_the_simulation(made, witnesses):
     for number in range(40):
         told = np.concatenate([[world.data.time], world.data.qpos, world.data.qvel])
         assert (states[number] == told).all()
-        world.apply(witnesses[0].witness[number])
+        world.step_filtered(witnesses[0].witness[number])
 
 
 def test_robosuite_plays_a_demonstration_as_robomimic_asks_it_to(made, witnesses):

@@ -85,7 +85,7 @@ def test_the_smoke_run_is_short_and_the_same_otherwise(tmp_path):
 
 
 def test_scripts_run_the_training_and_evaluate_its_newest_checkpoint(tmp_path):
-    """Programs that only note what they were asked for stand in for python and scengen."""
+    """Programs that only record their arguments stand in for python and scengen."""
     to, programs = tmp_path / "to", tmp_path / "programs"
     write_recipe(RecipeSettings(NAME, str(recorded(tmp_path / "data.hdf5")), str(to)))
     models, told = to / "training" / "20260101" / "models", tmp_path / "told.json"

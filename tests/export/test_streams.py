@@ -96,7 +96,7 @@ def test_positions_as_pictures_show_them_are_those_of_the_environment(tmp_path):
     ("words", "says"),
     [
         (["observations=[force_torqe]"], "no observation named 'force_torqe' (did you mean 'force_torque'?)"),
-        ([f"observations={CAMERA}"], f"it is a camera: say cameras={CAMERA}"),
+        ([f"observations={CAMERA}"], f"it is a camera: pass cameras={CAMERA}"),
         (["rates=fast"], "no rates named 'fast'; known: native, one"),
         (
             ["rates=native", "format=robomimic", "to={}.hdf5"],

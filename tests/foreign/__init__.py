@@ -1,1 +1,1 @@
-"""A package of its own: a task and its axis outside scengen, tested by `tests/test_conformance.py`."""
+"""A separate package: a task and its axis outside scengen, tested by `tests/test_conformance.py`."""

@@ -51,7 +51,7 @@ KINDS = {
 def start(
     kind: Kind, folder: Path, workers: int, limit: int | None = None, more: Sequence[str] = ()
 ) -> subprocess.Popen[str]:
-    """Begin or continue a run, in a process group of its own."""
+    """Start or continue a run, in a process group of its own."""
 
     def prepare() -> None:
         os.setsid()
@@ -81,7 +81,7 @@ def group(leader: int) -> list[int]:
 
 
 def hit(kind: Kind, folder: Path, way: str, after: float, workers: int, more: Sequence[str] = ()) -> str | None:
-    """Begin or continue a run and kill it. What went wrong, or nothing; None if it had ended before."""
+    """Start or continue a run and kill it. What went wrong, or nothing; None if it had ended before."""
     before = set(folder.parent.rglob("*.part"))
     process = start(kind, folder, workers, int(20_000 + 10_000 * after) if way == "disk" else None, more)
     if way != "disk":

@@ -38,7 +38,7 @@ REMEDY = re.compile(
 
 
 class Work(BaseException):
-    """The work itself begins: the command line was accepted."""
+    """The work itself starts: the command line was accepted."""
 
 
 def judge(line: list[str], place: Path) -> str:
@@ -142,7 +142,7 @@ WORK = (
     "scengen.cli.commands.asset.encode",
     "scengen.intake.asset.make_asset",
 )
-"""Where work begins that takes seconds: a command line that gets so far has been accepted."""
+"""Where work starts that takes seconds: a command line that gets so far has been accepted."""
 ROBOSUITE_WORK = {"scengen.envs.agreement.compare_all"}
 """Those of them that cannot be imported without robosuite."""
 

@@ -517,7 +517,7 @@ def test_gltf_is_turned_upright_as_it_defines_its_axes(tmp_path):
     assert read(str(tmp_path / "slab.obj")).mesh.extents == pytest.approx([0.12, 0.02, 0.08])
 
 
-# --- a process of its own ---------------------------------------------------------------------
+# --- a separate process ---------------------------------------------------------------------
 
 
 def crash(request):

@@ -1,4 +1,4 @@
-"""Scans in the place of proxies: turned as those lie, told by the pool, which stands alone without their files."""
+"""Scans in place of proxies: turned as those lie, told by the pool, which stands alone without their files."""
 
 import json
 import math

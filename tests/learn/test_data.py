@@ -95,7 +95,7 @@ def test_a_damaged_list_of_kept_episodes_is_one_line(mine):
 
 def test_of_several_tasks_one_is_chosen(mine):
     change_episode(mine, 1, task="packing")
-    with pytest.raises(BadConfig, match="demonstrations of domino_single and packing; say task="):
+    with pytest.raises(BadConfig, match="demonstrations of domino_single and packing; pass task="):
         TrainingData.read(mine)
     data = TrainingData.read(mine, task="domino_single")
     assert (data.task, len(data.trajectories)) == ("domino_single", 2)

@@ -11,7 +11,7 @@ from scengen import load_task
 from scengen.ood.analysis.redraw import task_of
 from scengen.pictures import sheet
 from scengen.pictures.render import VIEWS, fitted
-from scengen.pictures.twins import _motion, _projected, telling
+from scengen.pictures.twins import _motion, _projected, comparison_view
 from scengen.pool import Pool
 from scengen.samplers.split import ID
 from scengen.validate.rebuilt import world_of
@@ -36,7 +36,7 @@ def slope(world, view):
 @pytest.mark.parametrize("index", range(4))
 def test_a_chain_of_training_looks_parallel_and_its_diagonal_twin_oblique(index):
     worlds = pair("diagonal", index)
-    view = telling(worlds, ASPECT)
+    view = comparison_view(worlds, ASPECT)
     training, here = (slope(world, view) for world in worlds)
     assert training < 12 < 20 < here
     corner = fitted(worlds[0], ASPECT, *VIEWS[0])  # the negative control: the view from the free corner
@@ -46,10 +46,10 @@ def test_a_chain_of_training_looks_parallel_and_its_diagonal_twin_oblique(index)
 def test_a_motion_is_seen_from_the_side():
     """A height shows from the side, and not from above; what no picture shows is no motion."""
     worlds = pair("low_tiles")
-    view = telling(worlds, ASPECT)
+    view = comparison_view(worlds, ASPECT)
     assert _motion(*worlds, view) > 2 * _motion(*worlds, fitted(worlds[0], ASPECT, 180.0, -89.0))
     masses = pair("light_tiles")
-    assert _motion(*masses, telling(masses, ASPECT)) == 0.0
+    assert _motion(*masses, comparison_view(masses, ASPECT)) == 0.0
 
 
 @pytest.fixture
@@ -92,5 +92,5 @@ def test_both_pictures_of_a_pair_have_one_camera(tmp_path):
     from scengen.pictures.twins import twin_pictures
 
     first, second = pair("light_tiles")
-    one, other = twin_pictures(first, second, size=(160, 120), view=telling([first, second], ASPECT))
+    one, other = twin_pictures(first, second, size=(160, 120), view=comparison_view([first, second], ASPECT))
     assert one.shape == (120, 160, 3) and np.array_equal(one, other)  # only masses differ

@@ -20,7 +20,7 @@ LINES = [
 
 
 def test_what_is_left_out_is_there():
-    """A reason that outlives its command would hide the next one that begins so."""
+    """A reason that outlives its command would hide the next one that starts so."""
     assert all(any(command.startswith(start) for command in commands()) for start in APART)
     assert sum(not why_apart(command) for command in commands()) > 15, "most of what is cheap is run"
 

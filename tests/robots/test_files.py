@@ -136,7 +136,9 @@ def test_where_there_is_no_robot_one_line_names_the_three_ways(alone, capsys):
 
 def test_a_variable_that_names_no_folder_is_an_error(alone, tmp_path, monkeypatch):
     monkeypatch.setenv(files.VARIABLE, str(tmp_path / "gone"))
-    with pytest.raises(NoRobot, match="gone, which is no folder; set it to a folder with robosuite 1.5.2, or unset it"):
+    with pytest.raises(
+        NoRobot, match="gone, which is not a folder; set it to a folder with robosuite 1.5.2, or unset it"
+    ):
         loaded()
 
 

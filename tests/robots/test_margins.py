@@ -28,7 +28,7 @@ from scengen.tasks import (
 pytestmark = pytest.mark.slow
 
 SPARE = 0.1
-"""What a plan that follows a path needs at least [rad]: hands are turned to within 0.05 rad of what is asked for."""
+"""What a plan that follows a path needs at least [rad]: hands are turned to within 0.05 rad of what is requested."""
 BEARINGS = np.radians([-20.0, 20.0])
 """At which rings around the first axis are looked at [rad]: what is farther out leaves the table."""
 TAKEN_AT = TABLE_TOP + 0.03

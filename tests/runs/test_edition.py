@@ -95,7 +95,7 @@ def test_a_pool_with_other_scenarios_is_refused(edition):
         ("  domino_single: 1\n", "  packing: 1\n", "task_versions must have the tasks of the sets"),
         ("n: 6", "n: 7", "must have 7 scenarios"),
         ("seed: 0", "seed: zero", "seed = 'zero'; it must be a whole number"),
-        ("  - 0 ", "  - x", "is no scenario"),
+        ("  - 0 ", "  - x", "is not a scenario"),
         ("  - 0 ", "  - 9 ", "rising indices"),
         ("\nsets:", "\nset:", "no key of"),
         ("format", "\tformat", "not YAML"),

@@ -44,7 +44,7 @@ def test_a_shard_is_written_as_soon_as_no_earlier_index_is_open(run):
     filling.follow(records)
     assert written(journal) == ["scenarios-00000.parquet", "scenarios-00001.parquet"]
     assert not (journal.folder.parent / "pool").exists()
-    for index in (5, 6, 7):  # the pool has five: the last one begins a shard that is never full
+    for index in (5, 6, 7):  # the pool has five: the last one starts a shard that is never full
         add(index)
         filling.follow(records)
     assert len(written(journal)) == 2

@@ -216,7 +216,7 @@ def test_one_flipped_byte_anywhere_in_a_shard_is_found(mine):
         assert failures(mine)[0] == {
             "id": shard.name,
             "verdict": "refuted",
-            "reason": "the shard has another sha256 than the manifest says",
+            "reason": "the shard has a different sha256 than the manifest says",
         }
 
 

@@ -108,10 +108,10 @@ def test_a_move_that_gives_up_names_what_the_hand_touches():
 
 def test_a_push_keeps_its_velocity_until_the_world_says_stop():
     w = world()
-    low, start, began = w.arm.hand[2], w.arm.hand, w.time
+    low, start, started = w.arm.hand[2], w.arm.hand, w.time
     play(w, push(w.arm, 0.1 * UP, until=lambda: w.arm.hand[2] > low + 0.05))
     assert w.arm.hand[2] - low == pytest.approx(0.05, abs=0.002)
-    assert w.time - began == pytest.approx(0.5, abs=0.1)
+    assert w.time - started == pytest.approx(0.5, abs=0.1)
     assert np.linalg.norm((w.arm.hand - start)[:2]) < 0.002
 
 

@@ -71,7 +71,7 @@ def test_its_way_is_foreseen(changed, bounces):
     scenario = replace(BACK, **changed)
     ways = scenario.ways(scenario.start, scenario.speed * scenario.u, np.zeros(3))
     assert len(ways) == bounces + 1
-    found = moving(scenario, ways[-1].begins + 0.6)
+    found = moving(scenario, ways[-1].starts + 0.6)
     expected = [place_on(ways, (k + 1) / 100) for k in range(len(found))]
     assert np.abs(found[:, :2] - np.array(expected)[:, :2]).max() < 0.012
 

@@ -1,4 +1,4 @@
-"""What the cubes weigh is felt and not seen, the order is what is asked for, and a wrong zone is the end."""
+"""What the cubes weigh is felt and not seen, the order is what is requested, and a wrong zone is the end."""
 
 from dataclasses import dataclass, replace
 

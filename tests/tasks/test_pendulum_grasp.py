@@ -92,20 +92,20 @@ def test_a_jaw_that_closes_on_nothing_has_had_its_try():
 def test_a_jaw_that_begins_to_close_has_had_its_try(periods, then, reason):
     """Far from the bob, for some control periods. Then it opens again, or stops. Five periods are an accident."""
 
-    def begins(world):
+    def starts(world):
         yield from hold(world.arm, 0.6, OPEN)
         for _ in range(periods):
             yield [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, CLOSED]
         yield from hold(world.arm, 0.6, then)
 
-    found, free = (play(TASK, family(**vars(GRASP)), begins) for family in (PendulumGrasp, unguarded(PendulumGrasp)))
+    found, free = (play(TASK, family(**vars(GRASP)), starts) for family in (PendulumGrasp, unguarded(PendulumGrasp)))
     assert (found.reason if found.outcome == "failure" else "") == reason
     assert free.outcome == "timeout"
 
 
 @pytest.mark.parametrize(("wide", "lost"), [(-0.05, False), (-0.5, True)])
 def test_a_jaw_touches_the_bob_soon_after_it_was_wide_open(wide, lost):
-    """When it was, before it begins to touch [s]. The rule that the paper states does not see it: it is at the apex."""
+    """When it was, before it starts to touch [s]. The rule that the paper states does not see it: it is at the apex."""
     world = load(TASK, GRASP)
     solution_of = GRASP.oracle(world)
     while not world.touching("robot", BOB):

@@ -126,7 +126,7 @@ def test_in_the_middle_of_the_turn_an_episode_can_be_continued_bit_by_bit(histor
         world = load(TASK, NOMINAL)
         if used:
             for action in solution(TASK, NOMINAL).actions[:100]:
-                world.apply(action)
+                world.step_filtered(action)
         world.restore(history[middle][-1])
         episode = Episode(NOMINAL, world, TASK.horizon)
         for action in actions:

@@ -61,7 +61,7 @@ def test_piled_with_the_cone_on_top_it_stands_and_that_is_the_goal(index):
 
 
 def test_flat_shapes_may_be_piled_in_any_order():
-    """What is asked for is a pile that stands, not the one that the oracle builds."""
+    """What is requested is a pile that stands, not the one that the oracle builds."""
     four = ShapeStack()
     *flat, cone = four.order
     assert four.success(piled(four, [*reversed(flat), cone]))

@@ -99,7 +99,7 @@ def test_a_run_continues_and_refuses_other_settings(made, tmp_path, capsys):
     assert ends[0] == ends[1]
     capsys.readouterr()
     assert teleop(folder, operator="op8") == BAD_INPUT
-    assert "was begun with other settings (operator" in capsys.readouterr().err
+    assert "was started with other settings (operator" in capsys.readouterr().err
 
 
 def test_failed_takes_are_kept_counted_and_driven_again(tmp_path):

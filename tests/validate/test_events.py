@@ -283,11 +283,11 @@ def test_a_force_is_an_impulse_of_one_period(world):
     mass, force, dof = Cube().mass, 5.0, world.model.body("cube").dofadr[0]
     with world.events():
         world.force("cube", [0.0, 0.0, force])
-    world.apply(world.filter(world.idle))
+    world.step_filtered(world.filter(world.idle))
     assert world.data.qvel[dof + 2] == pytest.approx((force / mass - 9.81) * Loop.PERIOD, rel=0.01)
     with world.events():
         pass
-    world.apply(world.filter(world.idle))
+    world.step_filtered(world.filter(world.idle))
     assert world.data.qvel[dof + 2] == pytest.approx((force / mass - 2 * 9.81) * Loop.PERIOD, rel=0.01)
 
 
@@ -298,7 +298,7 @@ def test_a_servo_goes_where_it_is_driven_and_sags_by_the_torque_that_it_holds(go
     with world.events():
         world.drive("lid/hinge", goal)
     for _ in range(150):
-        world.apply(world.filter(world.idle))
+        world.step_filtered(world.filter(world.idle))
     angle, rate = world.hinge("lid/hinge")
     assert abs(rate) < 1e-3
     assert LID_STIFFNESS * (angle - goal) == pytest.approx(LID_MASS * 9.81 * 0.1 * np.cos(angle), rel=0.01)

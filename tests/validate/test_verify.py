@@ -556,7 +556,7 @@ def test_a_run_that_ended_with_fewer_than_were_asked_for_is_told(mine):
     changed(mine, lambda m: m.update(n=60))
     found = report(mine)
     assert found.holds and found.remarks == [
-        "60 scenarios were asked for, and the run ended with 6: this number is the author's word"
+        "60 scenarios were requested, and the run ended with 6: this number is the author's word"
     ]
 
 

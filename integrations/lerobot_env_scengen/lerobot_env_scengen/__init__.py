@@ -39,7 +39,7 @@ class EachOnce(gymnasium.Wrapper):
         """See `PoolEnv.reset`.
 
         Raises:
-            BadConfig: the pool has fewer scenarios than the run has begun episodes.
+            BadConfig: the pool has fewer scenarios than the run has started episodes.
         """
         if seed is not None and (options or {}).get(ROLLOUT):
             self._start = seed - self._slot if self._start is None else self._start

@@ -53,7 +53,7 @@ class Checkpoint:
         self.identity = [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in files]
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin an episode; the policy draws from torch's generator, which is seeded."""
+        """Start an episode; the policy draws from torch's generator, which is seeded."""
         torch.manual_seed(seed)
         self._policy.reset()
 

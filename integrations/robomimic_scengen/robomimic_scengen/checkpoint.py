@@ -33,7 +33,7 @@ class Checkpoint:
             BadConfig: there is no such file, or the policy reads what the environment does not give.
         """
         if not file.is_file():
-            raise BadConfig(f"{VARIABLE} = {file} is no file; it names a checkpoint of robomimic, models/*.pth")
+            raise BadConfig(f"{VARIABLE} = {file} is not a file; it names a checkpoint of robomimic, models/*.pth")
         device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         self._policy, stored = policy_from_checkpoint(device=device, ckpt_path=str(file))
         own, given = names(env.task.embodiment), env.observation_space.spaces
@@ -47,7 +47,7 @@ class Checkpoint:
         self.identity = hashlib.sha256(file.read_bytes()).hexdigest()
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin an episode; the policy draws from torch's generator, which is seeded."""
+        """Start an episode; the policy draws from torch's generator, which is seeded."""
         torch.manual_seed(seed)
         self._policy.start_episode()
 

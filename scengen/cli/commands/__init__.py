@@ -108,10 +108,10 @@ def chosen(pool: Pool, name: str) -> PoolRow:
 @contextmanager
 def misnaming_remarked() -> Iterator[None]:
     """Print a remark if a name that is looked up contradicts the id in it."""
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", Misnamed)
         yield
-    for one in told:
+    for one in caught:
         remark(str(one.message))
 
 

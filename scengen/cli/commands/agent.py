@@ -48,7 +48,7 @@ def _report(arguments: Arguments) -> int:
 
 def _shown(settings: AgentSettings, found: Outcome) -> int:
     """Print and write the tables of a run."""
-    folder, told = settings.folder, {}
+    folder, printed = settings.folder, {}
     if not found.results:
         raise BadConfig(f"nothing was graded: {found.stopped}")
     for stage in sorted({result["stage"] for result in found.results}):
@@ -64,11 +64,11 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
         if known:
             say(f"right in training, not in the twin: {lost} of {known}")
         write(folder / f"table-{stage}.md", markdown(title, rows))
-        told[stage] = {"table": plain(rows), "lost_in_twins": [lost, known]}
+        printed[stage] = {"table": plain(rows), "lost_in_twins": [lost, known]}
         if stage == UNDERSTAND:
-            told[stage]["beyond_blind"] = [asdict(line) for line in sight]
+            printed[stage]["beyond_blind"] = [asdict(line) for line in sight]
         if stage == PLAN and (agreed := agreement(found.results)):
-            told[stage] |= {"executed": plain(executed_lines(found.results)), "agreement": asdict(agreed)}
+            printed[stage] |= {"executed": plain(executed_lines(found.results)), "agreement": asdict(agreed)}
             _show_executed(settings, found)
     if errors := plan_errors(found.results):
         say("plans with errors: " + ", ".join(f"{kind} {count}" for kind, count in sorted(errors.items())))
@@ -76,7 +76,7 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
     for stage, count in sorted(formats.items()):
         say(f"{TITLES[stage]}: {count} replies had no valid form")
     versions = {result["task"]: result["task_version"] for result in found.results}
-    about = {"model": settings.model, "task_versions": versions, "stages": told}
+    about = {"model": settings.model, "task_versions": versions, "stages": printed}
     write_json(str(folder / f"table-{settings.stage}.json"), about)
     page = write_page(folder, found.results, settings.model, found.priors)
     say(f"{found.calls} new calls, {found.tokens} tokens; wrote {page} and tables beside it")

@@ -124,11 +124,11 @@ def _report(figures: dict[str, Any]) -> int:
     """Print the figures.
 
     Returns:
-        Exit status: whether the asset is as accurate as asked for, and comes to rest.
+        Exit status: whether the asset is as accurate as requested, and comes to rest.
     """
     error, hull, rest = figures["error"], figures["error_of_one_hull"], figures["rest"]
-    asked = figures["settings"]["error"]
-    is_accurate, count = max(error["outward"], error["inward"]) <= asked, figures["pieces"]
+    tolerance = figures["settings"]["error"]
+    is_accurate, count = max(error["outward"], error["inward"]) <= tolerance, figures["pieces"]
     say(
         f"{count} convex piece{'s' * (count > 1)}: {1000 * error['outward']:.2f} mm too far out and "
         f"{1000 * error['inward']:.2f} mm too far in at most, {error['volume']:.3f} times the volume; "
@@ -140,7 +140,7 @@ def _report(figures: dict[str, Any]) -> int:
     )
     say(_about_sides(figures))
     if not is_accurate:
-        say(f"MISSED: the error of {1000 * asked:g} mm; allow more pieces or a larger error")
+        say(f"MISSED: the error of {1000 * tolerance:g} mm; allow more pieces or a larger error")
     if not rest["rests"]:
         say("MISSED: it does not come to rest; give it a flat foot, or set a smaller error")
     return OK if is_accurate and rest["rests"] else FAILED

@@ -63,13 +63,13 @@ def command(arguments: Arguments) -> int:
 
 
 def _leaks(task: Task, settings: AttackSettings) -> Leaks:
-    """Search observations for hidden parameters, and print what they tell."""
+    """Search observations for hidden parameters, and print those that are revealed."""
     with ProgressBar(err, f"observe {task.name}", LEAK_DRAWS, settings.workers) as progress_bar:
         found = leaks(task, settings.split, LEAK_DRAWS, settings.seed, settings.workers, progress_bar.show)
     what = f"{len(found.hidden)} hidden parameters in {found.draws} draws of {found.split}"
-    say(f"{what}: observations tell {len(found.found)}")
+    say(f"{what}: observations reveal {len(found.found)}")
     for leak in found.found:
-        warn(f"LEAK {leak.stream} tells {leak.parameter}: explained variance {leak.explained:.2f} on held-out draws")
+        warn(f"LEAK {leak.stream} reveals {leak.parameter}: explained variance {leak.explained:.2f} on held-out draws")
     return found
 
 
@@ -113,7 +113,7 @@ def _remarks(report: AttackReport, names: Mapping[str, str]) -> list[str]:
 
 def _fixed_answers(prior: Prior) -> str:
     values = ", ".join(f"{value:.3g}" for value in prior.values)
-    told = f"fixed answers {values}: right in {prior.fitted:.1%} of the draws where they were fitted"
+    message = f"fixed answers {values}: right in {prior.fitted:.1%} of the draws where they were fitted"
     if prior.fresh is None or prior.bound is None:
-        return told
-    return f"{told}, in {prior.fresh:.1%} (< {prior.bound:.1%}) of {prior.draws} others"
+        return message
+    return f"{message}, in {prior.fresh:.1%} (< {prior.bound:.1%}) of {prior.draws} others"

@@ -39,7 +39,9 @@ def command(arguments: Arguments) -> int:
         environments = [environment(version, say) for version in versions_of(settings.mujoco)]
         found = by_version.measured(environments, settings.repeats)
         tables = [by_version.table(found)]
-        result = {version: {name: each.values for name, each in told.items()} for version, told in found.items()}
+        result = {
+            version: {name: each.values for name, each in measures.items()} for version, measures in found.items()
+        }
     elif settings.certify:
         table, result = certificates()
         tables = [table]

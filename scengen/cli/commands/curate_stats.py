@@ -44,8 +44,8 @@ def command(arguments: Arguments) -> int:
     out.print(_table(tasks))
     for own in tasks:
         if own.ways:
-            told = ", ".join(f"{way} ({count})" for way, count in [*own.ways.items()][:MAX_WAYS])
-            say(f"{own.task}: {len(own.ways)} ways, by the bodies moved first: {told}")
+            text = ", ".join(f"{way} ({count})" for way, count in [*own.ways.items()][:MAX_WAYS])
+            say(f"{own.task}: {len(own.ways)} ways, by the bodies moved first: {text}")
     if settings.to is not None:
         paths = paths_of(recordings)
         plots = {own.task: _plot(own, paths[own.task]) for own in tasks}

@@ -52,8 +52,8 @@ class Run:
 
 
 def command(arguments: Arguments) -> int:
-    asked = combinations("demos", arguments)
-    runs = [_checked(one, len(asked) > 1) for one in asked]
+    requested = combinations("demos", arguments)
+    runs = [_checked(one, len(requested) > 1) for one in requested]
     folders = [run.settings.to for run in runs]
     if len(set(folders)) < len(folders):
         raise BadConfig("two of the combinations would be written to the same folder; sweep task and split alone")
@@ -61,19 +61,19 @@ def command(arguments: Arguments) -> int:
     return max(statuses)
 
 
-def _checked(asked: Combination, several: bool) -> Run:
+def _checked(requested: Combination, several: bool) -> Run:
     """The run of a combination, checked before any run starts, with a folder below to= if there are several.
 
     Raises:
         BadConfig: the combination is not valid; the message names it.
     """
     try:
-        settings, task, certify_settings = read_task("demos", asked.overrides, DemosSettings)
+        settings, task, certify_settings = read_task("demos", requested.overrides, DemosSettings)
         settings.check(task)
     except ScengenError as error:
         if not several:
             raise
-        raise BadConfig(f"{asked}: {error}; nothing was made; leave this combination out") from None
+        raise BadConfig(f"{requested}: {error}; nothing was made; leave this combination out") from None
     if several:
         name = f"{task.name}-{settings.split}" + ("" if settings.to else "-demos")
         settings = replace(settings, to=str(Path(settings.to or GENERATED, name)))

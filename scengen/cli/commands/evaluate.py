@@ -32,8 +32,8 @@ def command(arguments: Arguments) -> int:
         every = settings.several()
     results, search = [], search_path(arguments)
     for one in every:
-        if told := other_version(one, search):
-            remark(told)
+        if difference := other_version(one, search):
+            remark(difference)
         with ProgressBar(err, f"evaluate {one.name}", 1, one.workers) as progress_bar:
             results.append(PolicyResult(one, _evaluated(one, progress_bar.of, search)))
     compared = Comparison(results)
@@ -66,7 +66,7 @@ def _edition_pools(settings: EvaluateSettings, edition: str) -> list[str]:
 
 
 def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None], search: Sequence[str]) -> Evaluation:
-    """Evaluate one policy, and keep its rollouts if that is asked for."""
+    """Evaluate one policy, and keep its rollouts if that is requested."""
     if not settings.keep:
         return evaluate(settings, progress, search)
     tasks = {pool.task: load_task(pool.task, search) for pool in map(Pool.open, settings.folders)}

@@ -36,8 +36,8 @@ def command(arguments: Arguments) -> int:
             f"drop = {settings.drop:g}; it must lie in (0, {settings.success:g}], as success is {settings.success:g}"
         )
     try_file(settings.json)
-    asked = {k: v for k, v in asdict(settings).items() if k not in ("success", "drop", "json")}
-    analysis = PowerAnalysis(**asked)
+    requested = {k: v for k, v in asdict(settings).items() if k not in ("success", "drop", "json")}
+    analysis = PowerAnalysis(**requested)
     smallest = analysis.smallest_drop(settings.success)
     with ProgressBar(err, "simulated experiments", 1) as progress_bar:
         shown = power_table(analysis, progress_bar.of)
@@ -47,7 +47,7 @@ def command(arguments: Arguments) -> int:
         f"from {settings.success:g}, {found} is detected with probability {analysis.power:g}; "
         f"the {analysis.seeds * analysis.rollouts} rollouts count as {analysis.effective:.0f} independent ones"
     )
-    result = {**asked, "success": settings.success, "effective": analysis.effective, "smallest_drop": smallest}
+    result = {**requested, "success": settings.success, "effective": analysis.effective, "smallest_drop": smallest}
     if settings.drop is not None:
         needed = seeds_for(analysis, settings.success, settings.drop)
         chance = analysis.chance(settings.success, settings.success - settings.drop)

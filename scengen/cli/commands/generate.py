@@ -86,18 +86,18 @@ class Run:
 
 
 def command(arguments: Arguments) -> int:
-    asked = combinations("generate", arguments)
-    if not asked[0].swept:
-        (run,) = map(_run, asked)
+    requested = combinations("generate", arguments)
+    if not requested[0].swept:
+        (run,) = map(_run, requested)
         return OK if run().certified == run.settings.n else FAILED
-    asked, found = _valid_runs(asked)
-    runs = _with_folders(asked, found)
+    requested, found = _valid_runs(requested)
+    runs = _with_folders(requested, found)
     say(f"{len(runs)} pools: {', '.join(str(run.settings.pool) for run in runs)}")
     summaries = []
     for run in runs:
         summaries.append(run())
         collection.write_index(summaries[-1].pool.folder.parent, [summaries[-1].pool])
-    out.print(_table(asked, runs, summaries))
+    out.print(_table(requested, runs, summaries))
     folder = summaries[-1].pool.folder.parent
     use = f"pool={folder} stands for all pools in it"
     say(f"wrote {folder / collection.INDEX}: {use}, in verify, show, report, evaluate")
@@ -115,14 +115,14 @@ def _progress_note(finished: int, verdicts: Mapping[str, int], rejections: "Coun
     return note
 
 
-def _run(asked: Combination) -> Run:
-    settings, task, certify_settings = read_task("generate", asked.overrides, GenerateSettings)
+def _run(requested: Combination) -> Run:
+    settings, task, certify_settings = read_task("generate", requested.overrides, GenerateSettings)
     if settings.ycb is not None:
         task = intake("ycb").with_scans(task, settings.split, settings.ycb)
     return Run(task, certify_settings, settings)
 
 
-def _valid_runs(asked: Sequence[Combination]) -> tuple[list[Combination], list[Run]]:
+def _valid_runs(requested: Sequence[Combination]) -> tuple[list[Combination], list[Run]]:
     """The runs of a sweep, all checked before the first one starts.
 
     A sweep over multiple tasks may name axes of each. A combination of a task with an axis of another task is left out
@@ -131,9 +131,9 @@ def _valid_runs(asked: Sequence[Combination]) -> tuple[list[Combination], list[R
     Raises:
         BadConfig: a combination is not valid; the message names it.
     """
-    runs = [_checked(one, _run) for one in asked]
+    runs = [_checked(one, _run) for one in requested]
     kept, lacking = [], []
-    for one, run in zip(asked, runs, strict=True):
+    for one, run in zip(requested, runs, strict=True):
         missing = _checked(one, lambda _, run=run: _missing(run))
         if missing and any(missing <= other.task.axes.keys() for other in runs):
             lacking.append(str(one))
@@ -150,26 +150,26 @@ def _missing(run: Run) -> set[str]:
     return {part.axis for part in Split.parse(run.settings.split).parts} - run.task.axes.keys()
 
 
-def _checked(asked: Combination, look: Callable[[Combination], T]) -> T:
+def _checked(requested: Combination, look: Callable[[Combination], T]) -> T:
     """Apply a function to a combination.
 
     Raises:
         BadConfig: the combination is not valid; the message names it.
     """
     try:
-        return look(asked)
+        return look(requested)
     except ScengenError as error:
-        raise BadConfig(f"{asked}: {error}; no pool was made; leave this combination out") from None
+        raise BadConfig(f"{requested}: {error}; no pool was made; leave this combination out") from None
 
 
-def _with_folders(asked: Sequence[Combination], runs: Sequence[Run]) -> list[Run]:
+def _with_folders(requested: Sequence[Combination], runs: Sequence[Run]) -> list[Run]:
     """The runs with folders below that of pool=: `<task>-<split>` and the other swept settings.
 
     Raises:
         BadConfig: two runs have the same folder.
     """
     folders = [
-        Path(run.settings.pool or GENERATED, _folder_name(one, run)) for one, run in zip(asked, runs, strict=True)
+        Path(run.settings.pool or GENERATED, _folder_name(one, run)) for one, run in zip(requested, runs, strict=True)
     ]
     folder, times = Counter(folders).most_common(1)[0]
     if times > 1:
@@ -180,19 +180,19 @@ def _with_folders(asked: Sequence[Combination], runs: Sequence[Run]) -> list[Run
     ]
 
 
-def _folder_name(asked: Combination, run: Run) -> str:
+def _folder_name(requested: Combination, run: Run) -> str:
     """Name of the folder of a combination."""
-    others = [f"{key}={value}" for key, value in asked.swept.items() if key not in ("task", "split")]
+    others = [f"{key}={value}" for key, value in requested.swept.items() if key not in ("task", "split")]
     return re.sub(r"[^\w.+@=,\[\]-]", "_", "-".join([run.task.name, run.settings.split, *others]))
 
 
-def _table(asked: Sequence[Combination], runs: Sequence[Run], summaries: Sequence[Summary]) -> Table:
+def _table(requested: Sequence[Combination], runs: Sequence[Run], summaries: Sequence[Summary]) -> Table:
     """A table with a line for each pool of a sweep."""
-    names = list(asked[0].swept)
+    names = list(requested[0].swept)
     table = Table(*names, title=f"{len(runs)} pools", title_justify="left")
     for column in ("certified", "indices", "CPU s each", "pool"):
         table.add_column(column, overflow="fold")
-    for one, run, summary in zip(asked, runs, summaries, strict=True):
+    for one, run, summary in zip(requested, runs, summaries, strict=True):
         certified = f"{summary.certified} of {run.settings.n}"
         each = f"{summary.cpu / summary.certified:.1f}" if summary.certified else "-"
         cells = (certified, str(summary.indices), each, str(summary.pool.folder))

@@ -108,7 +108,7 @@ def _take_of_run(settings: FilmSettings, folders: Sequence[str], arguments: Argu
     """A take of a demonstration or of a rollout of a policy, failed ones included if they were kept.
 
     Raises:
-        ScengenError: there is none of this scenario, or none of this number.
+        ScengenError: it does not exist of this scenario, or none of this number.
     """
     if settings.of != WITNESS:
         raise BadConfig(f"of = {settings.of}; what is filmed of demonstrations is the run itself: leave out of=")

@@ -30,10 +30,10 @@ def command(arguments: Arguments) -> int:
         remark(f"episodes that are not learned from: {left_out}")
     search = search_path(arguments)
     if data.task in tasks(search):
-        if told := load_task(data.task, search).other_version("recorded with", data.task_version):
-            remark(f"{recording} was {told}")
+        if status := load_task(data.task, search).other_version("recorded with", data.task_version):
+            remark(f"{recording} was {status}")
     with ProgressBar(err, f"train {settings.policy}", settings.epochs) as progress_bar:
-        trained = train(settings, data, lambda done, total, told: progress_bar.of(done, total, told))
+        trained = train(settings, data, lambda done, total, status: progress_bar.of(done, total, status))
     if not trained.losses:
         say(f"{settings.to} holds this policy already: same data, same settings")
     else:
@@ -66,7 +66,7 @@ def _recording(settings: TrainSettings, arguments: Arguments) -> str:
 def _table(trained: Trained) -> Table:
     own, (learned, held_out) = trained.settings, trained.losses[-1]
     table = Table("", "", title=f"{own.kind} for {own.task}", title_justify="left", show_header=False)
-    for what, told in (
+    for what, value in (
         ("demonstrations", f"{own.demonstrations}, and {trained.held_out} held out"),
         ("rows", f"{own.rows}, {own.rate} per second"),
         ("inputs", f"{own.inputs} of {own.steps} observations of {', '.join(own.streams)}"),
@@ -75,5 +75,5 @@ def _table(trained: Trained) -> Table:
         ("error of the goals [variances]", f"{learned:.4f}, held out {held_out:.4f}"),
         ("weights", own.weights_sha256),
     ):
-        table.add_row(what, told)
+        table.add_row(what, value)
     return table

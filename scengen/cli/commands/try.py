@@ -83,7 +83,7 @@ class TrySettings:
 
     @property
     def run(self) -> int | None:
-        """Number of the jittered run that is asked for; None if none is."""
+        """Number of the requested jittered run; None if no jittered run is requested."""
         word, colon, number = self.what.partition(":")
         if word != JITTER:
             return None
@@ -238,20 +238,20 @@ def _moment(world: World, error: GaveUp) -> str:
     frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)][1:]  # without the watching one
     moves = " > ".join(frame.f_code.co_name for frame in frames)
     where = f" in {moves}" if moves else ""
-    told = [f"it gave up at {world.time:.2f} s{where}", *_hands(world)]
+    parts = [f"it gave up at {world.time:.2f} s{where}", *_hands(world)]
     if (target := _target(error.__traceback__)) is not None:
-        told.append(f"the target was {_point(target)} m")
-    return "; ".join(told)
+        parts.append(f"the target was {_point(target)} m")
+    return "; ".join(parts)
 
 
 def _hands(world: World) -> list[str]:
     """Where each hand is, and what its arm touches."""
-    told = []
+    parts = []
     for arm in world.arms:
         whose = f"the hand of arm {arm.number}" if len(world.arms) > 1 else "the hand"
         touched = sorted(world.touching_bodies(arm.label) - {ROBOT})
-        told.append(f"{whose} was at {_point(arm.hand)} m and touched {', '.join(touched) or 'nothing'}")
-    return told
+        parts.append(f"{whose} was at {_point(arm.hand)} m and touched {', '.join(touched) or 'nothing'}")
+    return parts
 
 
 def _target(trace: TracebackType | None) -> np.ndarray | None:

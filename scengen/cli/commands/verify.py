@@ -320,8 +320,8 @@ def _print_report(pool: Pool, report: Report) -> None:
         if n
     ]
     if report.claimed_checks:
-        told = f"not made again at level {report.level}, and claimed: {', '.join(report.claimed_checks)}"
-        say(f"{told}; level=full makes them again")
+        message = f"not made again at level {report.level}, and claimed: {', '.join(report.claimed_checks)}"
+        say(f"{message}; level=full makes them again")
     say(f"settings: {report.settings or 'unknown'}")
     if pool.manifest.is_subset:
         say("a subset: its scenarios were chosen from another pool, and its rejection report is that of the other pool")

@@ -56,11 +56,11 @@ def command(arguments: Arguments) -> int:
     for line in remarks(result):
         remark(line)
     totals = {version: under(result, version) for version in versions}
-    for version, told in totals.items():
-        say(f"mujoco {version}: {', '.join(f'{told[name]} {name}' for name in told if name != 'checks')}")
-    if any(told[FLIPPED] for told in totals.values()):
+    for version, counts in totals.items():
+        say(f"mujoco {version}: {', '.join(f'{counts[name]} {name}' for name in counts if name != 'checks')}")
+    if any(counts[FLIPPED] for counts in totals.values()):
         return FAILED
-    return BAD_INPUT if any(told[UNKNOWN] for told in totals.values()) else OK
+    return BAD_INPUT if any(counts[UNKNOWN] for counts in totals.values()) else OK
 
 
 def _judged(
@@ -72,8 +72,8 @@ def _judged(
         ScengenError: the checks do not run there, or run with another version.
     """
     folders = [str(pool.folder) for pool in pools]
-    asked = {name: getattr(settings, name) for name in ("level", "n", "workers", "limit_seconds", "limit_mb")}
-    answers = where.lines(MODULE, {"pools": folders, "search": list(search), **asked})
+    requested = {name: getattr(settings, name) for name in ("level", "n", "workers", "limit_seconds", "limit_mb")}
+    answers = where.lines(MODULE, {"pools": folders, "search": list(search), **requested})
     about = next(answers)
     if about["mujoco"] != where.mujoco:
         raise ScengenError(

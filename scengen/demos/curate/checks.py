@@ -158,7 +158,7 @@ def actions(subject: Subject) -> Iterator[Finding]:
 
 
 def states(subject: Subject) -> Iterator[Finding]:
-    """Whether hands move as hands can, and while they are told to."""
+    """Whether the motion of the hands is possible, and happens while it is commanded."""
     period, moves, robot = 1.0 / subject.recording.fps, subject.moves, str(subject.recording.info["robot_type"])
     own = np.hstack([subject.column(name) for name in proprioception(robot)])
     if len(wrong := np.flatnonzero(np.abs(own - subject.column(STATE)).max(axis=1) > ROUNDING)):

@@ -72,7 +72,7 @@ class Curated:
 
     @property
     def undecided(self) -> list[EpisodeReport]:
-        """Flagged episodes with a sufficient score that nobody has decided about; they stay out."""
+        """Flagged episodes with a sufficient score and no decision; they stay out."""
         scored = (report for report in self.reports if report.score >= KEPT_SCORE)
         return [report for report in scored if report.flagged and report.episode not in self.decisions]
 

@@ -64,7 +64,7 @@ def read_reports(path: Path) -> list[EpisodeReport]:
     """The reports in a file that `curate` has written.
 
     Raises:
-        PoolError: there is none, or it holds something else.
+        PoolError: it does not exist, or it holds something else.
     """
     try:
         return [_report(read_json(line)) for line in path.read_text().splitlines()]

@@ -75,7 +75,7 @@ def _table(path: Path, columns: Sequence[str], count: int) -> list[tuple[int, di
         return []
     try:
         if path.stat().st_size > MAX_CSV:
-            raise PoolError(f"{path} has more than {MAX_CSV} bytes; it is no table of episodes")
+            raise PoolError(f"{path} has more than {MAX_CSV} bytes; it is not a table of episodes")
         with open(path, newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
             rows = [(reader.line_num, {name: str(row.get(name) or "") for name in columns}) for row in reader]

@@ -28,7 +28,7 @@ SYSTEM = """You review recorded demonstrations of a robot arm before they are us
 one episode: measured terms, the checks that were made, and their findings. Reply with JSON: remarks about faults that \
 a person should look at, each with the first and last frame concerned. No remark is a good answer if nothing is wrong. \
 You cannot withdraw a finding."""
-"""What the model is told of its task."""
+"""Prompt that describes the task to the model."""
 SCHEMA: dict[str, Any] = {
     "title": "remarks",
     "type": "object",

@@ -176,7 +176,7 @@ class _Films:
                 self._probes = {(key, each.row): each for key, probes in recorded.films.items() for each in probes}
 
     def compare(self, row: int) -> None:
-        """Take the pictures of a row anew, if it is one of those to be compared."""
+        """Render the pictures of a row again, if it is one of those to be compared."""
         for key in self._differences:
             probe, frozen = self._probes.get((key, row)), self._frozen.get(key)
             if probe is None and (frozen is None or row not in frozen.frames):

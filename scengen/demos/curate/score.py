@@ -19,7 +19,7 @@ LEAST_SPREAD = 0.1
 """Smallest interquartile range that is assumed [medians]: demonstrations of a script are nearly alike, and one that is
 a little slower is not worse."""
 LEAST_GRIPS = 1.0
-"""Smallest interquartile range that is assumed for the number of grips: one more change is no retry, two are."""
+"""Smallest interquartile range that is assumed for the number of grips: one more change is not a retry, two are."""
 KEPT_SCORE = 4
 """Lowest score that is kept (paper, App. C)."""
 

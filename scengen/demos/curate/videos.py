@@ -14,7 +14,7 @@ from .findings import Finding
 BLUR = 0.3
 """Mean Sobel gradient below which a picture is blurred [grey levels] (paper, App. C)."""
 SCENE_CHANGE = 10.0
-"""Median absolute deviation of a picture from the one before, above which the scene has changed [grey levels] (paper,
+"""Median absolute deviation of a picture from the previous one, above which the scene has changed [grey levels] (paper,
 App. C: MAD score)."""
 FROZEN = 0.5
 """Mean difference of two pictures below which they are the same [grey levels] (lerobot-lint)."""
@@ -31,17 +31,17 @@ PROBE_EDGE = 32
 NEAR = 6
 """Number of pictures before and after the one of a moment among which it is looked for."""
 PROBES = 3
-"""Number of moments of a film that are taken anew: in each third of it the one with most motion."""
+"""Number of moments of a film that are rendered again: in each third of it the one with most motion."""
 CLEARLY = 0.8
 """Share of the difference from the picture of the same row below which another one is clearly more alike."""
 MISMATCH = 5.0
-"""Mean difference of a film from pictures taken anew above which it shows something else [grey levels]. Compression
+"""Mean difference of a film from pictures rendered again above which it shows something else [grey levels]. Compression
 makes 1.2 to 1.6, another camera of the same scene 8."""
 
 
 @dataclass(frozen=True)
 class Probe:
-    """A picture of a film with its neighbours, to be compared with one that is taken anew."""
+    """A picture of a film with its neighbours, to be compared with one that is rendered again."""
 
     row: int
     near: NDArray[np.uint8]
@@ -95,7 +95,7 @@ def stands_still(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> bool:
 
 
 def compared(camera: str, differences: Sequence[NDArray[np.float64]]) -> Iterator[Finding]:
-    """What the comparison of a film with pictures taken anew finds.
+    """Findings of the comparison of a film with pictures rendered again.
 
     Args:
         camera: key of the video.
@@ -106,7 +106,7 @@ def compared(camera: str, differences: Sequence[NDArray[np.float64]]) -> Iterato
     least = float(np.median([each.min() for each in differences]))
     if least > MISMATCH:
         told = {"difference": least, "limit": MISMATCH}
-        yield found("VIDEO_MISMATCH", f"{camera} shows something else than the replay", **told)
+        yield found("VIDEO_MISMATCH", f"{camera} shows something other than the replay", **told)
         return
     moved = [int(each.argmin()) - NEAR for each in differences if each.min() < CLEARLY * each[NEAR]]
     if 2 * len(moved) > len(differences):
@@ -124,7 +124,7 @@ def check_video(
         camera: key of the video.
         pictures: decoded pictures, shape (height, width, 3) each.
         rows: number of rows of the episode.
-        moving: whether the arm is told to move in each row, shape (rows,).
+        moving: whether the arm is commanded to move in each row, shape (rows,).
     """
     before, count, blurred, changed, dark, bright = None, 0, [], [], [], []
     same = np.zeros(rows, bool)
@@ -142,7 +142,7 @@ def check_video(
         before, count = grey, number + 1
     if count != rows:
         yield found(
-            "FRAME_COUNT", f"{camera} has another number of pictures than there are rows", frames=count, rows=rows
+            "FRAME_COUNT", f"{camera} has a different number of pictures than there are rows", frames=count, rows=rows
         )
     told = {"BLUR": blurred, "SCENE_CHANGE": changed, "BLACK": dark, "WHITE": bright}
     words = {"BLUR": "is blurred", "SCENE_CHANGE": "changes at once", "BLACK": "is black", "WHITE": "is white"}

@@ -123,7 +123,7 @@ class Run:
     """A run of takes with its journal. Close it at the end."""
 
     def __init__(self, source: Source, settings: TeleopSettings, told: Callable[[str], None] = lambda text: None):
-        """Begin a run, or continue one with the same settings.
+        """Start a run, or continue one with the same settings.
 
         Args:
             told: called with lines for the person.

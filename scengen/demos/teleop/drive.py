@@ -35,7 +35,7 @@ class Timing:
         """The figures in words."""
         late, reaction = (1000 * self.quantile(name, 0.95) for name in ("late", "reaction"))
         return (
-            f"{len(self.late)} control periods; 95 % began within {late:.2f} ms of their time, "
+            f"{len(self.late)} control periods; 95 % started within {late:.2f} ms of their time, "
             f"and 95 % of the events became motion within {1000 * Loop.PERIOD + reaction:.1f} ms"
         )
 

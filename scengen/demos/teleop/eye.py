@@ -1,4 +1,4 @@
-"""Pictures of a take that is driven, drawn in a thread of their own, so that the control loop does not wait."""
+"""Pictures of a take that is driven, drawn in a separate thread, so that the control loop does not wait."""
 
 import threading
 import time
@@ -90,7 +90,7 @@ class Eye:
                         with self._fresh:
                             self._fresh.wait(timeout=0.5)
                         time.sleep(max(0.0, begun + self._least - time.monotonic()))
-        except BaseException as error:  # whoever looks is told
+        except BaseException as error:  # reported to the person at the page
             self._fault = error
             self._ready.set()
 

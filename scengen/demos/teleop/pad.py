@@ -20,7 +20,7 @@ BUTTONS = (
 )
 """Buttons, 0 or 1."""
 CONNECTED = "connected"
-"""Control that tells whether the pad is plugged in, 0 or 1."""
+"""Control that reports whether the pad is plugged in, 0 or 1."""
 CONTROLS = (*STICKS, *TRIGGERS, *BUTTONS, CONNECTED)
 MAX_SECONDS = 3600.0
 """Latest time of an event in a file [s]."""
@@ -93,14 +93,14 @@ def read_events(path: Path) -> TimedEvents:
     Lines without `control` are comments, such as the first and the last one of a take's log.
 
     Raises:
-        BadConfig: the file is missing or too large, or a line is no event.
+        BadConfig: the file is missing or too large, or a line is not an event.
     """
     try:
         if path.stat().st_size > MAX_FILE:
-            raise BadConfig(f"{cut(str(path))} has more than {MAX_FILE} bytes; it is no file of events")
+            raise BadConfig(f"{cut(str(path))} has more than {MAX_FILE} bytes; it is not a file of events")
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        why = " ".join(str(getattr(error, "strerror", "") or "it is no text").split()).lower()
+        why = " ".join(str(getattr(error, "strerror", "") or "it is not a text").split()).lower()
         raise BadConfig(f"{cut(str(path))} cannot be read: {why}; give a file of JSON lines, script:FILE") from None
     found: TimedEvents = {}
     last = 0

@@ -64,7 +64,7 @@ class _Sdl:
                 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
             pygame.display.init()
         self.pad = Pad()
-        """Values of all controls as the device has told them."""
+        """Values of all controls as last reported by the device."""
 
     def begin(self) -> None:
         """Forget the events between two takes, except for those that say how the device is held."""
@@ -129,7 +129,7 @@ class Gamepad(_Sdl):
         return []
 
     def _open(self) -> list[PadEvent]:
-        """Use the first pad, if there is one, and tell how its axes are held: SDL only tells changes."""
+        """Use the first pad, if there is one, and report the positions of its axes: SDL reports only changes."""
         if not controller.get_count() or not controller.is_controller(0):
             return []
         self._opened = controller.Controller(0)

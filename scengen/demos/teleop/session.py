@@ -114,7 +114,7 @@ class Session:
     """
 
     def __init__(self, stage: Stage, world: World | None = None):
-        """Begin a take.
+        """Start a take.
 
         Args:
             world: the world of the stage, which is reset; by default it is loaded.

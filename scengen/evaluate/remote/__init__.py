@@ -1,1 +1,1 @@
-"""Policies that run in a process of their own and are reached through a socket."""
+"""Policies that run in a separate process and are reached through a socket."""

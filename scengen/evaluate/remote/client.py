@@ -1,4 +1,4 @@
-"""Files that name observations and actions for a policy server: conf/clients/*.yaml, or a file of your own."""
+"""Files that name observations and actions for a policy server: conf/clients/*.yaml, or your own file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

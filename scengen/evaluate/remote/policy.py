@@ -38,7 +38,7 @@ class RemotePolicy:
             policy: address of the server.
 
         Raises:
-            BadServer: there is none, or it expects or sends something else.
+            BadServer: it does not exist, or it expects or sends something else.
         """
         self.env, self.client = env, client
         self.server: Server = SERVERS[address_of(policy).scheme](address_of(policy), client)
@@ -56,7 +56,7 @@ class RemotePolicy:
         return hashlib.sha256(json.dumps(known, sort_keys=True, default=repr).encode()).hexdigest()
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
-        """Begin an episode: no actions are left, and the past holds nothing."""
+        """Start an episode: no actions are left, and the past holds nothing."""
         self._history.clear()
         self._plan.clear()
         self.server.reset(seed)

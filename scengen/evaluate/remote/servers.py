@@ -51,12 +51,12 @@ class Server(ABC):
         """The reply to an observation.
 
         Raises:
-            BadServer: there is none, or it is not one of the protocol.
+            BadServer: it does not exist, or it is not one of the protocol.
         """
 
     @abstractmethod
     def reset(self, seed: int) -> None:
-        """Begin an episode, if the protocol has a message for it."""
+        """Start an episode, if the protocol has a message for it."""
 
     @abstractmethod
     def close(self) -> None:
@@ -137,7 +137,7 @@ class OpenPi(Server):
         return self._repeated(self._exchange, _packed(observation, openpi_array))
 
     def reset(self, seed: int) -> None:
-        """Begin an episode: the protocol has no message for it."""
+        """Start an episode: the protocol has no message for it."""
 
     def close(self) -> None:
         super().close()
@@ -197,7 +197,7 @@ class Gr00t(Server):
         return self._repeated(self._action, {"observation": nested(observation), "options": None})
 
     def reset(self, seed: int) -> None:
-        """Begin an episode; the seed is an option that GR00T's own policies ignore."""
+        """Start an episode; the seed is an option that GR00T's own policies ignore."""
         self._repeated(self._call, "reset", {"options": {"seed": seed}})
 
     def close(self) -> None:

@@ -106,7 +106,7 @@ def _array(kind: Any, shape: Any, data: Any) -> NDArray[Any]:
     if not isinstance(shape, (list, tuple)) or len(shape) > MAX_AXES or any(type(n) is not int or n < 0 for n in shape):
         raise BadMessage(f"an array in a message has the shape {cut(repr(shape))}")
     if not isinstance(data, bytes) or len(data) != math.prod(shape) * dtype.itemsize:
-        raise BadMessage(f"an array in a message has another number of bytes than {kind} of shape {tuple(shape)}")
+        raise BadMessage(f"an array in a message has a different number of bytes than {kind} of shape {tuple(shape)}")
     return np.frombuffer(data, dtype).reshape(shape).copy()
 
 

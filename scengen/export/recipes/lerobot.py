@@ -134,7 +134,7 @@ class Order:
     recording: Recording
     """The recording."""
     settings: RecipeSettings
-    """What was asked for."""
+    """What was requested."""
 
     @property
     def cameras(self) -> list[str]:
@@ -167,7 +167,7 @@ def scripts(settings: RecipeSettings) -> Scripts:
     }
     written = {name: script(title, origin, " \\\n".join(lines)) for name, (title, lines) in parts.items()}
     install = (
-        f"with Python 3.12 in an environment of its own: pip install -r {Path(settings.to, 'requirements.txt')} "
+        f"with Python 3.12 in a separate environment: pip install -r {Path(settings.to, 'requirements.txt')} "
         f"(LeRobot {LEROBOT})"
     )
     return Scripts(recipe.origin, install, {"requirements.txt": _requirements(order), **written})

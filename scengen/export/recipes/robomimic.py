@@ -66,7 +66,7 @@ def scripts(settings: RecipeSettings) -> Scripts:
         raise BadConfig(f"device = {cut(repr(settings.device))}; {told}")
     data = _read(settings.data)
     requirements = Path(settings.to, "requirements.txt")
-    install = f"in an environment of its own: pip install -r {requirements} (robomimic {ROBOMIMIC})"
+    install = f"in a separate environment: pip install -r {requirements} (robomimic {ROBOMIMIC})"
     origin = f"{NAME}, robomimic {ROBOMIMIC}. {ORIGIN}"
     smoke = {"experiment": {"epoch_every_n_steps": SMOKE_BATCHES, "save": {"every_n_epochs": 1}}}
     smoke |= {"train": {"batch_size": 2, "num_epochs": 1, "num_data_workers": 0, "cuda": False}}
@@ -90,7 +90,7 @@ def _read(path: str) -> Data:
 
     Raises:
         BadConfig: it has nothing that a policy could see.
-        PoolError: it is no recording of scengen in robomimic's format.
+        PoolError: it is not a recording of scengen in robomimic's format.
     """
     check_target(path, "data")
     import h5py
@@ -113,7 +113,7 @@ def _read(path: str) -> Data:
     poses = ("eef_pos", f"eef_quat{keys.SITE}", "gripper_qpos")
     low = tuple(key for key in names if key.endswith(poses) or (key == keys.OBJECT and not pictures))
     if not pictures and keys.OBJECT not in low:
-        raise BadConfig(f"{path} has neither pictures nor {keys.OBJECT}; a policy needs one of them, so record it anew")
+        raise BadConfig(f"{path} has neither pictures nor {keys.OBJECT}; a policy needs one: record it again")
     return Data(low, pictures, (width, height), names)
 
 
@@ -211,7 +211,7 @@ def _text(config: Mapping[str, Any]) -> str:
 
 def _requirements() -> str:
     return (
-        f"# {NAME}: Python 3.11 or newer, in an environment of its own. cmake builds its requirement egl_probe.\n"
+        f"# {NAME}: Python 3.11 or newer, in a separate environment. cmake builds its requirement egl_probe.\n"
         f"robomimic=={ROBOMIMIC}\nscengen\n"
         f"# To play checkpoints, the robot's files: {INSTALL}\n"
         "# and, from a checkout of scengen: pip install integrations/robomimic_scengen\n"

@@ -15,7 +15,7 @@ SIGNIFICANCE = 0.05
 BINS = 4
 """Number of bins per parameter: quarters of the proposals."""
 MAX_SINGLE_VALUES = 6
-"""Maximum number of different values of a parameter for which each value has a bin of its own."""
+"""Maximum number of different values of a parameter for which each value has a separate bin."""
 MAX_JOINT = 1000
 """Maximum number of proposals in the joint test, which needs a matrix of their distances. The first ones are taken."""
 

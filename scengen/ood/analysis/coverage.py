@@ -41,7 +41,7 @@ def evenness(numbers: Points) -> Evenness:
 def farthest_points(points: Points, count: int) -> NDArray[np.int64]:
     """Choose points so that the smallest distance between two of them is large.
 
-    Greedy: begin in the middle, then always take the point that is farthest from all chosen ones (Gonzalez 1985: at
+    Greedy: start in the middle, then always take the point that is farthest from all chosen ones (Gonzalez 1985: at
     least half the best possible distance). The first m of n chosen points are those that would be chosen for m.
 
     Args:

@@ -30,7 +30,7 @@ class Histogram:
     edges: tuple[float, ...]
     """Edges of the bars, one more than there are bars; for choices, their values."""
     choices: bool
-    """Whether every value has a bar of its own."""
+    """Whether every value has a separate bar."""
     proposed: tuple[int, ...]
     """Number of proposed draws in each bar."""
     accepted: tuple[int, ...]

@@ -1,6 +1,6 @@
-"""Hidden parameters that observations tell: regressions of each hidden parameter on each stream.
+"""Hidden parameters that observations reveal: regressions of each hidden parameter on each stream.
 
-A parameter is hidden if no observation is to tell it (`param(hidden=True)`). Poses may tell it all the same: the tilt
+A parameter is hidden if no observation may reveal it (`param(hidden=True)`). Poses may reveal it all the same: the tilt
 of a rod that rests on its supports may depend on its centre of mass. Observations are taken at the start and after a
 time without action. A regression is fitted on half of the draws, and its explained variance measured on the other half.
 """
@@ -30,7 +30,7 @@ IDLE_TIME = 0.3
 """Time without action before the second observation [s]. Events whose moment is hidden come later: those that have come
 may be seen."""
 MIN_EXPLAINED = 0.2
-"""Explained variance on held-out draws from which a stream counts as telling a parameter."""
+"""Explained variance on held-out draws from which a stream counts as revealing a parameter."""
 COLUMNS = 8
 """Number of columns of a stream that a regression uses: those that depend most on the parameter in the fitted half."""
 RIDGE = 1e-3
@@ -43,12 +43,12 @@ LIMITS = Limits(60.0, 4000)
 
 @dataclass(frozen=True)
 class Leak:
-    """A hidden parameter that a stream tells."""
+    """A hidden parameter that a stream reveals."""
 
     parameter: str
     stream: str
     explained: float
-    """Explained variance on held-out draws; 1 if the stream tells the parameter exactly."""
+    """Explained variance on held-out draws; 1 if the stream reveals the parameter exactly."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Leaks:
     hidden: tuple[str, ...]
     """Hidden parameters that vary in these draws."""
     found: tuple[Leak, ...]
-    """The stream that tells most of each parameter that is told, the clearest one first."""
+    """For each revealed parameter, the stream that reveals most of it; the clearest one first."""
 
 
 Observed = tuple[Mapping[str, float], Mapping[str, NDArray[np.float64]]]
@@ -76,7 +76,7 @@ def leaks(
     workers: Workers = 1,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Leaks:
-    """Measure which hidden parameters the streams of a task tell in a split.
+    """Measure which hidden parameters the streams of a task reveal in a split.
 
     Args:
         n: number of draws.
@@ -95,10 +95,10 @@ def leaks(
     truth = {name: column for name, column in truth.items() if np.ptp(column) > 0.0}
     found = []
     for name, column in truth.items():
-        told = {stream: explained([readings[stream] for _, readings in seen], column) for stream in seen[0][1]}
-        best = max(told, key=told.__getitem__)
-        if told[best] >= MIN_EXPLAINED:
-            found.append(Leak(name, best, told[best]))
+        shares = {stream: explained([readings[stream] for _, readings in seen], column) for stream in seen[0][1]}
+        best = max(shares, key=shares.__getitem__)
+        if shares[best] >= MIN_EXPLAINED:
+            found.append(Leak(name, best, shares[best]))
     found.sort(key=lambda leak: -leak.explained)
     return Leaks(split, len(seen), tuple(truth), tuple(found))
 
@@ -126,8 +126,8 @@ def explained(readings: Sequence[NDArray[np.float64]], column: NDArray[np.float6
         return 0.0
     known = (chosen - chosen[:half].mean(axis=0)) / chosen[:half].std(axis=0)
     inputs = np.hstack([np.ones((len(known), 1)), known, known**2])
-    fitted, told = inputs[:half], column[:half]
-    weights = np.linalg.solve(fitted.T @ fitted + RIDGE * half * np.eye(inputs.shape[1]), fitted.T @ told)
+    fitted, expected = inputs[:half], column[:half]
+    weights = np.linalg.solve(fitted.T @ fitted + RIDGE * half * np.eye(inputs.shape[1]), fitted.T @ expected)
     left = column[half:] - inputs[half:] @ weights
     return max(0.0, 1.0 - float(np.mean(left**2) / np.var(column[half:])))
 

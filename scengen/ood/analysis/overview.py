@@ -119,14 +119,14 @@ def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequen
             break
         pictures[overview.folder] = shown
         plots |= {overview.folder: plot} if plot else {}
-    told = [(contrast, contrast.shared[:SHOWN_PAIRS]) for contrast in contrasts]
+    parts = [(contrast, contrast.shared[:SHOWN_PAIRS]) for contrast in contrasts]
     text = template("report.html").render(
         overviews=overviews,
         contrasts=contrasts,
         pictures=pictures,
         plots=plots,
         steps=("proposed", *STAGES),
-        names=names(pools, [id_ for _, pairs in told for pair in pairs for id_ in (pair.one, pair.other)]),
+        names=names(pools, [id_ for _, pairs in parts for pair in pairs for id_ in (pair.one, pair.other)]),
         pairs=SHOWN_PAIRS,
         most=MAX_PAIRS,
         energy_of=MAX_ENERGY_SCENARIOS,

@@ -23,7 +23,7 @@ class Cause:
     """Median of the parameter in training."""
     value: Value
     """Value nearest to the centre with which the scenario failed."""
-    began: Value
+    started: Value
     """Value before shrinking."""
     departure: float
     """Distance of the value from the centre [training widths]."""

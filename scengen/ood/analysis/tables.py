@@ -82,7 +82,7 @@ def shrunk_table(shrunk: Shrunk, units: dict[str, str]) -> Table:
     )
     for c in shrunk.causes:
         unit = units[c.parameter]
-        table.add_row(c.parameter, f"{c.centre:.4g}", f"{c.value:.4g} {unit}", f"{c.began:.4g}", f"{c.departure:.2f}")
+        table.add_row(c.parameter, f"{c.centre:.4g}", f"{c.value:.4g} {unit}", f"{c.started:.4g}", f"{c.departure:.2f}")
     return table
 
 

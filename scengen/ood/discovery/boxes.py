@@ -8,7 +8,7 @@ from .trial import Point, Range, RegionBox, SearchTrial
 def boxes(trials: Sequence[SearchTrial]) -> list[tuple[int, RegionBox]]:
     """Boxes in which memories broke, each after its evidence, most evidence first.
 
-    A box of two regions is left out if one of the regions has a box of its own.
+    A box of two regions is left out if one of the regions has a separate box.
     """
     where: dict[tuple[int, ...], list[SearchTrial]] = {}
     for trial in trials:

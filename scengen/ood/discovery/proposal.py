@@ -117,10 +117,10 @@ def as_yaml(task: Task, findings: Sequence[Finding], spent: Mapping[str, int]) -
     Args:
         spent: number of trials by stage and by outcome.
     """
-    told = ", ".join(f"{count} {what}" for what, count in spent.items())
+    text = ", ".join(f"{count} {what}" for what, count in spent.items())
     axes = {one.axis.name: _entry(one.axis) for one in findings}
     found = yaml.safe_dump({"axes": axes}, sort_keys=False, default_flow_style=None, width=120)
-    return f"# Axes of {task.name} found by scengen axis discover: {told}\n{found}"
+    return f"# Axes of {task.name} found by scengen axis discover: {text}\n{found}"
 
 
 def _entry(axis: Axis) -> dict[str, Any]:

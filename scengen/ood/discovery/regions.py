@@ -25,7 +25,7 @@ class Region:
 
     parameter: Parameter
     edge: float
-    """Training value at which the region begins."""
+    """Training value at which the region starts."""
     far: float
     """Value at which the region ends."""
     beyond: bool

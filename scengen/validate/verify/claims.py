@@ -112,9 +112,9 @@ def wrong_hashes(row: PoolRow) -> Iterator[str]:
     certificate = row.certificate
     scene, witness = sha256(row.scene_xml), sha256(row.witness.tobytes())
     if {scene} != {row.scene_sha256, certificate.scene_sha256}:
-        yield "the scene has another sha256 than its row or certificate says"
+        yield "the scene has a different sha256 than its row or certificate says"
     if {witness} != {row.witness_sha256, certificate.witness_sha256}:
-        yield "the witness has another sha256 than its row or certificate says"
+        yield "the witness has a different sha256 than its row or certificate says"
 
 
 def wrongly_drawn(row: PoolRow, claims: Claims) -> Iterator[str]:

@@ -91,7 +91,7 @@ class Examiner:
             return Examination(MANIFEST, verdict, (f"{_described(job)} cannot be made again: {why}",))
 
     def _judged(self, row: PoolRow, reasons: Sequence[str], *flags: bool) -> Examination:
-        """The examination of a row with reasons against it. Those of other code are no faults of another version."""
+        """The examination of a row with reasons against it. Those of other code are not faults of another version."""
         other = self.claims.of_another_version
         faults = [reason for reason in reasons if not (other and isinstance(reason, OfCode))]
         if faults or not reasons:

@@ -274,7 +274,7 @@ class _Run:
             told = f"the attack on the pool counts {rollouts} rollouts and {len(manifest.hits)} hits"
             remarks.append(f"{told}: the hits are replayed, and the number of rollouts is the author's word")
         if not self.manifest.is_subset and len(self.pool) < self.manifest.n:
-            told = f"{self.manifest.n} scenarios were asked for, and the run ended with {len(self.pool)}"
+            told = f"{self.manifest.n} scenarios were requested, and the run ended with {len(self.pool)}"
             self.found.remarks.append(f"{told}: this number is the author's word")
         for what in self._miscounted():
             if isinstance(what, OfCode) and self.other_version:

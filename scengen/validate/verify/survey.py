@@ -115,7 +115,7 @@ def wrong_order(indices: Sequence[int], manifest: Manifest) -> Iterator[str]:
     """Faults of the number of rows and of their indices.
 
     Args:
-        indices: indices in the order of the rows, each larger than the one before.
+        indices: indices in the order of the rows, each larger than the previous one.
     """
     count, n = len(indices), manifest.n
     if count != manifest.scenarios:
@@ -162,7 +162,7 @@ def wrong_subset(manifest: Manifest) -> Iterator[str]:
     """Contradictions in the counts of a subset; the counts of the pool that it was chosen from cannot be repeated."""
     scenarios, funnel = manifest.scenarios, manifest.funnel
     if manifest.n != scenarios or scenarios > funnel.get("certified", 0):
-        yield "the subset has another number of scenarios than it says, or more than were certified"
+        yield "the subset has a different number of scenarios than it says, or more than were certified"
     if list(funnel) and set(funnel) != {"proposed", *STAGES}:
         yield "the funnel has other steps than that of a run"
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from hand import Hand
 
-from scengen.attack.plans import LOWEST_HAND, SLOW, pursue, velocity_of
+from scengen.attack.plans import LOWEST_HAND, STOPPED_SPEED, pursue, velocity_of
 from scengen.geometry import UP
 from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
@@ -15,7 +15,7 @@ from scengen.tasks.linear_intercept import LinearIntercept
 
 AHEAD = 2.5  # time after which the ball comes to the fingers that stop it [s]
 BEFORE = 0.035  # distance of the fingers before the ball that they brake [m]
-BRAKED_SPEED = 3 * SLOW  # speed below which the ball is picked up [m/s]
+BRAKED_SPEED = 3 * STOPPED_SPEED  # speed below which the ball is picked up [m/s]
 
 
 class AnyTouch(LinearIntercept):
@@ -37,7 +37,7 @@ def follow(scenario: Scenario, world: World) -> Plan:
 def stop_and_pick(scenario: Scenario, world: World) -> Plan:
     """Put closed fingers into the ball's way, brake it until it is slow, pick it up."""
     arm = world.arm
-    yield from until(hold(arm, 9.0, CLOSED), lambda: math.hypot(*velocity_of(arm, "ball")[:2]) > SLOW)
+    yield from until(hold(arm, 9.0, CLOSED), lambda: math.hypot(*velocity_of(arm, "ball")[:2]) > STOPPED_SPEED)
     velocity = velocity_of(arm, "ball")
     along = velocity / np.linalg.norm(velocity)
     rot, at = closing_along(arm, np.cross(UP, along)), world.com("ball") + AHEAD * velocity

@@ -1,4 +1,4 @@
-"""T15: wait midway, go to the block that begins to slide, and swing the bin there by a turn of the wrist."""
+"""T15: wait midway, go to the block that starts to slide, and swing the bin there by a turn of the wrist."""
 
 import math
 
