@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import yaml
-
 from ...envs.gym import action_repeat_at
 from ...envs.observations import proprioception
 from ...errors import BadConfig, UnknownName, cut
 from ...samplers.task_files import conf_dir
+from ...work.plain import read_yaml
 from ...work.typed import typed
 
 PROTOCOLS = {"ws": "openpi", "zmq": "gr00t"}
@@ -138,14 +137,9 @@ def read_client(name: str | None, address: Address) -> ClientSettings:
     known = sorted(path.stem for path in folder.glob("*.yaml"))
     name = name or PROTOCOLS[address.scheme]
     path = folder / f"{name}.yaml" if name in known else Path(name)
-    if not path.is_file():
+    if not path.exists() or path.is_dir():
         raise UnknownName("client", name, [*known, "FILE.yaml"])
-    try:
-        node = yaml.safe_load(path.read_text())
-    except (yaml.YAMLError, ValueError, OSError, RecursionError) as error:
-        raise BadConfig(f"client = {path}; it is not YAML ({cut(' '.join(str(error).split()))})") from None
-    if not isinstance(node, Mapping) or not all(isinstance(key, str) for key in node):
-        raise BadConfig(f"client = {path}; it must be a group of settings, as in conf/clients/openpi.yaml")
+    node = read_yaml("client", path)
     if "file" in node:
         raise UnknownName(
             f"key of {path}", "file", [key for key in ClientSettings.__dataclass_fields__ if key != "file"]
