@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations axes beliefs attacks drift baselines curves docs docs-links results pictures site reference bench clean checker checker-base mutants behaviour behaviour-check
+.PHONY: setup demo ci test wheel slow long durations readme fuzz kills check types format certify stacks stack-sample readers integrations axes beliefs attacks drift baselines curves docs docs-links results pictures site reference bench clean checker checker-base mutants behaviour behaviour-check tag
 
 setup: $(READY)
 
@@ -218,6 +218,14 @@ reference: setup
 
 bench: setup
 	$(BIN)/scengen bench
+
+# Tags the commit as the release that pyproject.toml names. CHANGELOG.md must have a dated section for it, and nothing may be uncommitted.
+tag:
+	@version=$$(sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml); \
+	test -z "$$(git status --porcelain)" || { echo "commit or remove what is uncommitted"; exit 1; }; \
+	grep -q "^version: $$version$$" CITATION.cff || { echo "CITATION.cff has another version than $$version"; exit 1; }; \
+	grep -Eq "^## $$version - [0-9]{4}-[0-9]{2}-[0-9]{2}$$" CHANGELOG.md || { echo "CHANGELOG.md has no dated section $$version"; exit 1; }; \
+	git tag --annotate "v$$version" --message "scengen $$version" && echo "tagged v$$version; publish it with git push origin v$$version"
 
 clean:
 	rm -rf $(ENV) $(DEMO) $(DEMO).run build dist *.egg-info

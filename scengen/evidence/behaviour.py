@@ -48,6 +48,8 @@ TRAINING_DRAWS = 3
 CORE = ("oracle", "noise 0.3", "idle", "shortcut", "jitter 1", "ablation")
 """Beginnings of the names of the rollouts that are played for every change of the code. Raw shortcuts are not among
 them."""
+SELF_TEST = ("oracle", "noise 0.3", "idle")
+"""Rollouts that the self-test of an installation plays: half of the time of `CORE`, and the same scene and rules."""
 
 Cheat = tuple[Callable[[Scenario, World], Plan], bool]
 """A plan that once reached the goal without the intended means, and whether it acts without the filter."""

@@ -73,11 +73,11 @@ def command(arguments: Arguments) -> int:
     # Hydra would look for a file of this name in conf/task, and find none for `all`.
     tasks = [argument.partition("=")[2] for argument in arguments if argument.startswith("task=")]
     settings = read("verify", [a for a in arguments if not a.startswith("task=")], VerifySettings)
-    if tasks:
-        return _reproduce(tasks[-1], settings, search_path(arguments))
     for name, known in (("level", LEVELS), ("others", OTHERS)):
         if getattr(settings, name) not in known:
             raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
+    if tasks:
+        return _reproduce(tasks[-1], settings, search_path(arguments))
     if settings.others == SKIP and settings.sample is None:
         raise BadConfig(f"others = {SKIP}; it skips the scenarios outside a sample; give sample=N, too")
     at_least(settings, workers=1, sample=1, seed=0, limit_seconds=1, limit_mb=200)
@@ -205,7 +205,9 @@ def _reproduce(chosen: str, settings: VerifySettings, search: Sequence[str]) -> 
             raise UnknownName("task", name, [*known, ALL])
     limits = Limits(max(settings.limit_seconds, REPRODUCTION_LIMITS.seconds), settings.limit_mb)
     with ProgressBar(err, "verify tasks", len(names), settings.workers) as progress_bar:
-        found = sorted(reproduced(names, settings.workers, search, limits, progress_bar.show), key=lambda r: r.task)
+        full = settings.level == "full"
+        results = reproduced(names, settings.workers, search, limits, full, progress_bar.show)
+        found = sorted(results, key=lambda r: r.task)
     table = Table("task", "version", "reproduces", "rollouts")
     for one in found:
         compared = one.compared
