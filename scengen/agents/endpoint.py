@@ -7,7 +7,6 @@ is sent; retries, time limits and the journal are here anyway.
 import base64
 import difflib
 import json
-import math
 import os
 import re
 import time
@@ -255,7 +254,7 @@ def tokens(given: Any) -> int | None:
     """A number of tokens; 0 if it is not told, None if it is no number of tokens."""
     if given is None:
         return 0
-    if isinstance(given, bool) or not isinstance(given, (int, float)) or not math.isfinite(given):
+    if isinstance(given, bool) or not isinstance(given, (int, float)):
         return None
     return int(given) if 0 <= given <= MAX_TOKENS else None
 

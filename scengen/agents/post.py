@@ -75,16 +75,16 @@ def post(url: str, body: Mapping[str, Any], key: str, timeout: float) -> Any:
     try:
         content = _within(timeout, lambda: _content(request, timeout))
     except http.client.HTTPException as error:
-        raise Broken(f"it breaks off, or is not HTTP ({type(error).__name__}: {cut(str(error))})") from None
+        raise Broken(f"gives no whole answer in HTTP ({type(error).__name__}: {cut(repr(str(error)))})") from None
     except TimeoutError:
-        raise Broken(f"no whole answer within {timeout:g} s") from None
+        raise Broken(f"gives no whole answer within {timeout:g} s") from None
     except OSError as error:
         raise Broken(f"cannot be reached: {cut(str(error))}") from None
     try:
         return json.loads(content)
     except (ValueError, RecursionError) as error:
-        told = f"{type(error).__name__}: {cut(' '.join(content[:80].decode(errors='replace').split()))}"
-        raise Broken(f"does not answer JSON ({told}); is it an OpenAI-compatible endpoint?") from None
+        told = "".join(letter for letter in content[:80].decode(errors="ignore") if letter.isprintable())
+        raise Broken(f"does not answer JSON ({type(error).__name__}: {told}); is it OpenAI-compatible?") from None
 
 
 def _content(request: urllib.request.Request, timeout: float) -> bytes:
