@@ -179,15 +179,19 @@ def _objects(text: str) -> list[dict[str, Any]]:
 
 
 def _objects_in(text: str) -> Iterator[dict[str, Any]]:
-    """JSON objects in a text, from left to right. What is in braces and no JSON is passed over."""
+    """JSON objects in a text, from left to right, until one is cut short. Braces around other things are passed over."""
     at, decoder = text.find("{"), json.JSONDecoder()
     for _ in range(MAX_OBJECTS):
         if at < 0:
             return
         try:
             value, end = decoder.raw_decode(text, at)
-        except (ValueError, RecursionError):
+        except json.JSONDecodeError as error:
+            if error.pos >= len(text.rstrip()) or error.msg.startswith("Unterminated"):
+                return
             value, end = {}, at + 1
+        except (ValueError, RecursionError):
+            return
         if value:
             yield value
         at = text.find("{", end)
