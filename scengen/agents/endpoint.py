@@ -5,9 +5,7 @@ is sent; retries, time limits and the journal are here anyway.
 """
 
 import base64
-import difflib
 import json
-import os
 import re
 import time
 from collections.abc import Mapping, Sequence
@@ -17,8 +15,9 @@ from email.utils import parsedate_to_datetime
 from typing import Any
 
 from ..errors import BadConfig, cut
+from ..work.secrets import hidden, secret, shown
 from .models import Call, ModelError, RefusedRequest, Reply, Tool, Turn
-from .post import Broken, Refusal, check_address, post, shown
+from .post import Broken, Refusal, check_address, post
 
 TRIES = 5
 """Largest number of tries of a request that the server was too busy for, or whose answer was broken."""
@@ -38,7 +37,6 @@ _ENDS = {
     "length": "cut: the limit of tokens was reached (finish_reason = length)",
     "content_filter": "filtered: the endpoint withholds the answer (finish_reason = content_filter)",
 }
-_NAME = re.compile(r"[A-Z_][A-Z0-9_]{0,63}")
 
 
 @dataclass(frozen=True)
@@ -61,8 +59,7 @@ class Endpoint:
         check_address("url", self.url)
         if odd := [name for name in self.omit if name not in OPTIONAL]:
             raise BadConfig(f"omit = {cut(str(odd[0]))}; known: {', '.join(OPTIONAL)}")
-        if self.key:
-            _check_key(self.key)
+        secret("key", self.key)
         self._omitted.update(self.omit)
 
     def reply(
@@ -112,7 +109,7 @@ class Endpoint:
         for tried in range(1, TRIES + 1):
             wait = None
             try:
-                answer = post(f"{self.url.rstrip('/')}/chat/completions", body, _key(self.key), self.timeout)
+                answer = post(f"{self.url.rstrip('/')}/chat/completions", body, secret("key", self.key), self.timeout)
                 if (error := _error_in(answer)) is None:
                     return answer
                 raise error
@@ -133,25 +130,7 @@ class Endpoint:
         return kind(f"{shown(self.url)} refuses the request for {cut(self.name)}: {told}")
 
     def _hidden(self, text: str) -> str:
-        """A text without the key, which some servers repeat."""
-        key = _key(self.key)
-        return text.replace(key, "***") if key else text
-
-
-def _key(name: str) -> str:
-    return os.environ.get(name, "").strip() if name else ""
-
-
-def _check_key(name: str) -> None:
-    """Raise `BadConfig` unless an environment variable holds a key that a header may hold. No key is told."""
-    told = name if _NAME.fullmatch(name) else "(not shown)"
-    if not _key(name):
-        close = difflib.get_close_matches(name, os.environ, n=1, cutoff=0.8)
-        hint = f" (did you mean {close[0]}?)" if close else ""
-        why = "there is no such environment variable" if told == name else "it must name an environment variable"
-        raise BadConfig(f"key = {told}; {why}{hint}; set it to the endpoint's key")
-    if not (_key(name).isascii() and _key(name).isprintable()):
-        raise BadConfig(f"key = {told}; its value has a line end or a letter that no header may hold; set it again")
+        return hidden(text, secret("key", self.key))
 
 
 def _body(

@@ -7,7 +7,6 @@ import http.client
 import ipaddress
 import json
 import queue
-import re
 import threading
 import urllib.error
 import urllib.request
@@ -17,6 +16,7 @@ from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
 from ..errors import BadConfig, cut
+from ..work.secrets import shown
 
 T = TypeVar("T")
 MAX_ANSWER = 16_000_000
@@ -52,11 +52,6 @@ def check_address(name: str, url: str) -> None:
     if "@" in parts.netloc or parts.query or parts.fragment:
         why = "a password in it would be written into files; give the key with key=NAME, and nothing after the path"
         raise BadConfig(f"{name} = {shown(url)}; {why}")
-
-
-def shown(url: str) -> str:
-    """An address for messages: without a password, or what follows the path."""
-    return cut(re.sub(r"[?#].*", "?***", re.sub(r"(^|//)[^/]*@", r"\1***@", url), flags=re.S))
 
 
 def post(url: str, body: Mapping[str, Any], key: str, timeout: float) -> Any:

@@ -179,7 +179,7 @@ def _objects(text: str) -> list[dict[str, Any]]:
 
 
 def _objects_in(text: str) -> Iterator[dict[str, Any]]:
-    """JSON objects in a text, from left to right, until one is cut short. Braces around other things are passed over."""
+    """JSON objects in a text, from left to right, until one is cut short. Other braces are passed over."""
     at, decoder = text.find("{"), json.JSONDecoder()
     for _ in range(MAX_OBJECTS):
         if at < 0:
