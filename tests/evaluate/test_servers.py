@@ -84,7 +84,7 @@ def test_a_key_that_a_server_repeats_is_not_told(monkeypatch):
 
 def test_a_server_that_wants_a_key_is_said_to(monkeypatch):
     refuse = {"process_request": lambda peer, request: peer.respond(401, "no")}
-    told = pytest.raises(BadServer, match=r"HTTP 401.*; does it need a key")
+    told = pytest.raises(BadServer, match=r"HTTP 401.*does it need a key")
     with openpi(lambda peer: None, **refuse) as (address, _), told:
         OpenPi(address, client()).describe()
 

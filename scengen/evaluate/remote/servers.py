@@ -172,7 +172,7 @@ class OpenPi(Server):
         except (*self._errors, ValueError) as error:
             plain.close()
             why = f"the server refuses a websocket ({type(error).__name__}: {cut(str(error))})"
-            raise Lost(f"{why}; does it need a key?" if "HTTP 40" in why else why) from None
+            raise Lost(f"{why} (does it need a key?)" if "HTTP 40" in why else why) from None
         return mapping(self._received(), "the metadata")
 
     def _exchange(self, request: bytes) -> Mapping[str, Any]:
