@@ -11,7 +11,7 @@ import sys
 import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import mujoco
@@ -45,7 +45,9 @@ _forked = False
 def _leave_to_the_parent() -> None:
     """Leave the renderers of the process that was forked alone: to free them here would wait for its threads."""
     global _forked
-    _forked = _forked or bool(_close_at_exit.cache_info().currsize)
+    if _forked or not _close_at_exit.cache_info().currsize:
+        return
+    _forked, sys.excepthook = True, partial(_end_at_once, sys.excepthook)
     for renderer in list(_open_renderers):
         for part in (renderer._gl_context, renderer._mjr_context):
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(part))
@@ -53,6 +55,14 @@ def _leave_to_the_parent() -> None:
     _open_renderers.clear()
     if backend := sys.modules.get("mujoco.egl"):
         atexit.unregister(backend.EGL.eglTerminate)
+
+
+def _end_at_once(hook: Any, *error: Any) -> None:
+    """Show the error that ends a forked process, and end it: the handlers of OpenGL would wait for missing threads."""
+    hook(*error)
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(1)
 
 
 if hasattr(os, "register_at_fork"):
