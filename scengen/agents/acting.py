@@ -18,7 +18,7 @@ from ..sim.embodiment import hands
 from ..sim.world import World
 from .calls import Calls
 from .models import Call, Turn
-from .primitives import DONE, BadCall, Primitive, next_action, primitive, tools
+from .primitives import DONE, BadCall, Primitive, called, next_action, primitive, tools
 from .questioning import ACT, Exam, Result
 from .scene import controller, pictures, prompt, robot, told
 
@@ -211,9 +211,7 @@ def _choose(episode: Episode, about: dict[str, Any], calls: Calls, left: int) ->
         turns = episode.turns(left, fault)
         reply = calls.ask(asked, turns, every, None, episode.exam.temperature, episode.exam.stand_in)
         try:
-            if len(reply.calls) != 1:
-                raise BadCall(f"{len(reply.calls)} tools were called; call one")
-            return primitive(reply.calls[0], episode.env.world), retry
+            return primitive(called(reply, every, calls.strict), episode.env.world, calls.strict), retry
         except BadCall as error:
             fault = str(error)
     return primitive(HOLD, episode.env.world), RETRIES + 1

@@ -2,15 +2,20 @@
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadConfig, ScengenError
+from ..errors import BadConfig, ScengenError, cut
 from ..work.log import Log
+from ..work.plain import MAX_JOURNAL, read_plain
 from ..work.targets import write
-from .models import Call, Model, Reply, Tool, Turn
+from ..work.typed import typed
+from .endpoint import tokens
+from .models import Model, Reply, Tool, Turn
+from .prices import Prices
 
 CALLS = "calls.jsonl"
 """Name of the journal in the folder of a run."""
@@ -35,20 +40,36 @@ class Budget:
     tokens: float | None = None
     """Largest number of tokens of prompts and answers; no limit by default."""
 
+    def check(self) -> None:
+        """Raise `BadConfig` if a limit is none."""
+        for name, limit in vars(self).items():
+            if limit is not None and not 0 <= limit < float("inf"):
+                raise BadConfig(f"budget.{name} = {limit:g}; it must be a number from 0 on")
+
 
 class Calls:
     """Asks a model through the journal: what was asked before is answered from there."""
 
-    def __init__(self, log: Log, model: Model | None, budget: Budget):
+    def __init__(
+        self, log: Log, model: Model | None, budget: Budget, prices: Prices | None = None, strict: bool = False
+    ):
         """
         Args:
             log: the open journal.
             model: the model; None if only recorded answers count.
             budget: limits of new calls.
+            prices: prices of the model; None if they are not known.
+            strict: whether replies must have the asked form exactly, see `replies.read_json`.
+
+        Raises:
+            BadConfig: the journal holds something else than calls.
         """
-        self.log, self.model, self.budget = log, model, budget
-        self.new, self.tokens = 0, 0
-        self._recorded = {record["digest"]: record for record in log.records}
+        self.log, self.model, self.budget, self.prices, self.strict = log, model, budget, prices, strict
+        self.new, self.tokens, self.cost = 0, 0, 0.0
+        self.notes = Counter[str]()
+        """What tables should say about requests, and of how many it is true."""
+        self._counted = 0  # tokens that count for the budget
+        self._recorded = {record["digest"]: record for record in _checked(log.records, log.path)}
 
     def recall(self, path: Path) -> None:
         """Answer from the journal of another run as well.
@@ -56,12 +77,7 @@ class Calls:
         Raises:
             BadConfig: the file cannot be read, or is not a journal.
         """
-        try:
-            _, *lines = path.read_text().splitlines()
-            found = [json.loads(line) for line in lines]
-            self._recorded = {record["digest"]: record for record in found} | self._recorded
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise BadConfig(f"{path} is not a journal of calls ({error}); name the {CALLS} of a run") from None
+        self._recorded = {record["digest"]: record for record in read_calls(path)} | self._recorded
 
     def ask(
         self,
@@ -90,9 +106,9 @@ class Calls:
         digest = _sha(json.dumps([asked, schema], sort_keys=True).encode())[:32]
         if (record := self._recorded.get(digest)) is None:
             record = self._add(digest, asked, turns, tools, schema or {}, temperature, model or self.model)
-        told = record["reply"]
-        calls = tuple(Call(**call) for call in told["calls"])
-        return Reply(told["text"], calls, told["tokens_in"], told["tokens_out"], told["seconds"])
+        reply = _reply(record["reply"])
+        self.notes.update(reply.notes)
+        return reply
 
     def _add(
         self,
@@ -109,10 +125,12 @@ class Calls:
             raise OutOfBudget("the journal has no answer to this call, and no model is asked")
         if self.budget.calls is not None and self.new >= self.budget.calls:
             raise OutOfBudget(f"budget.calls = {self.budget.calls} is used up; repeat the command with a larger one")
-        if self.budget.tokens is not None and self.tokens >= self.budget.tokens:
+        if self.budget.tokens is not None and self._counted >= self.budget.tokens:
             raise OutOfBudget(
                 f"budget.tokens = {self.budget.tokens:g} is used up; repeat the command with a larger one"
             )
+        if self.prices and self.prices.most is not None and self.cost >= self.prices.most:
+            raise OutOfBudget(f"max_cost = {self.prices.most:g} is used up; repeat the command with a larger one")
         for turn in turns:
             for picture in turn.pictures:
                 path = picture_path(self.log.path.parent, _sha(picture)[:16])
@@ -123,12 +141,59 @@ class Calls:
             raise BadConfig(
                 f"the model's method reply returned {type(reply).__name__}; expected scengen.agents.models.Reply"
             )
+        told = (tokens(reply.tokens_in) or 0, tokens(reply.tokens_out) or 0)
+        reply = replace(reply, tokens_in=told[0], tokens_out=told[1])
         record = {"digest": digest, **asked, "reply": asdict(reply)}
         self.log.add(record)
         self._recorded[digest] = record
-        self.new += 1
-        self.tokens += reply.tokens_in + reply.tokens_out
+        self._count(told, estimate(turns) if model is self.model else (0, 0))
         return record
+
+    def _count(self, told: tuple[int, int], estimated: tuple[int, int]) -> None:
+        """Count a call. What a model does not tell is estimated, so that it does not pass a limit unseen."""
+        self.new, self.tokens = self.new + 1, self.tokens + sum(told)
+        counted = told if all(told) else estimated
+        self._counted += sum(counted)
+        self.cost += self.prices.of(counted) if self.prices else 0.0
+
+
+def read_calls(path: Path) -> list[dict[str, Any]]:
+    """The calls in a journal.
+
+    Raises:
+        BadConfig: the file cannot be read, or is no journal.
+    """
+    try:
+        _, *lines = read_plain(path, MAX_JOURNAL).decode().splitlines()
+        return _checked([json.loads(line) for line in lines], path)
+    except (OSError, ValueError, RecursionError) as error:
+        raise BadConfig(
+            f"{cut(str(path))} is no journal of calls ({cut(str(error))}); name the {CALLS} of a run"
+        ) from None
+
+
+def _checked(records: Sequence[Any], path: Path) -> list[dict[str, Any]]:
+    """Records of a journal, all of which must be calls: anyone may have written it."""
+    return [_record(record, f"{cut(str(path))}, line {number}") for number, record in enumerate(records, 2)]
+
+
+def _record(record: Any, where: str) -> dict[str, Any]:
+    try:
+        _ = [record["about"][name] + "" for name in ("task", "split", "scenario")]
+        _ = [record["about"][name] + 0 for name in ("temperature", "stage")]
+        for turn in record["turns"]:
+            _ = "".join((turn["role"], turn["text"], *turn["pictures"]))
+        return {**record, "digest": record["digest"] + "", "reply": asdict(_reply(record["reply"]))}
+    except (KeyError, TypeError, ValueError, AttributeError, ScengenError):
+        raise BadConfig(f"{where}, is no call; name the {CALLS} of a run") from None
+
+
+def _reply(plain: Mapping[str, Any]) -> Reply:
+    """The reply in a record. Numbers of tokens and seconds that are none count as 0."""
+    counts = {name: tokens(plain.get(name)) or 0 for name in ("tokens_in", "tokens_out")}
+    waited = plain.get("seconds")
+    seconds = waited if isinstance(waited, (int, float)) and 0.0 <= waited < 1e9 else 0.0
+    return typed("", Reply, {**plain, **counts, "seconds": float(seconds)})
 
 
 def picture_path(folder: Path, name: str) -> Path:

@@ -1,6 +1,5 @@
 """The page of a run: tables, and for each scenario prompt, pictures, reply and grade side by side."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 from ..evaluate.table import cells
 from ..pictures.page import template
 from ..work.targets import write
-from .calls import CALLS
+from .calls import CALLS, read_calls
 from .priors import Prior
 from .questioning import ACT, PLAN, UNDERSTAND
 from .tables import GRADES, agreement, by_question, executed_lines, lines, lost_in_twins, plan_errors, sight_lines
@@ -23,7 +22,7 @@ def write_page(
     folder: Path, results: Sequence[Mapping[str, Any]], model: str, priors: Mapping[str, Mapping[str, Prior]]
 ) -> Path:
     """Write `report.html` into the folder of a run; pictures stay beside it. Returns its path."""
-    calls = [json.loads(line) for line in (folder / CALLS).read_text().splitlines()[1:]]
+    calls = read_calls(folder / CALLS)
     by_exam: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
     for call in calls:
         by_exam.setdefault(_key(call["about"]), []).append(call)

@@ -6,7 +6,7 @@ why it stopped.
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,8 @@ from ..scenario import Action, Plan
 from ..sim.arm import Arm
 from ..sim.world import World
 from ..skills.motion import CLOSED, OPEN, Pace, alone, go_to, hold
-from .models import Call, Tool
+from .models import Call, Reply, Tool
+from .replies import FormatError, read_json
 
 SPEED = 0.25  # speed of the hand in a move [m/s]
 WITHIN = 0.005
@@ -87,7 +88,36 @@ class Primitive:
     """Function that starts its plan of the whole robot."""
 
 
-def primitive(call: Call, world: World) -> Primitive:
+def called(reply: Reply, every: Sequence[Tool], strict: bool = True) -> Call:
+    """The call in a reply. An endpoint that cannot read calls of its model leaves them in the text, as JSON.
+
+    Raises:
+        BadCall: there is none, or more than one.
+    """
+    found = reply.calls if reply.calls or strict else _written(reply.text)
+    if len(found) != 1:
+        raise BadCall(reply.ended or f"{len(found)} tools were called; call one")
+    name = found[0].name
+    return found[0] if strict else Call(name.removeprefix("functions."), found[0].arguments)
+
+
+def _written(text: str) -> tuple[Call, ...]:
+    """The call in a text such as `{"name": "Hold", "arguments": {"ticks": 5}}`; none if it is something else."""
+    try:
+        told = read_json(text, strict=False)
+        name, given = told["name"], told.get("arguments", told.get("parameters"))
+    except (FormatError, KeyError, TypeError, AttributeError):
+        return ()
+    return (Call(str(name), given if isinstance(given, str) else json.dumps(given)),)
+
+
+def _arguments(call: Call, strict: bool) -> Any:
+    """The arguments of a call as data. Some endpoints write them as JSON twice, or leave a tag behind them."""
+    given = read_json(call.arguments or "{}", strict)
+    return read_json(given, strict) if isinstance(given, str) and not strict else given
+
+
+def primitive(call: Call, world: World, strict: bool = True) -> Primitive:
     """The primitive of a call.
 
     Raises:
@@ -97,8 +127,8 @@ def primitive(call: Call, world: World) -> Primitive:
     if call.name not in found:
         raise BadCall(f"there is no tool {cut(repr(call.name))}; tools: {', '.join(found)}")
     try:
-        given = json.loads(call.arguments or "{}")
-    except (ValueError, RecursionError):
+        given = _arguments(call, strict) or {}
+    except FormatError:
         raise BadCall(f"the arguments of {call.name} are not JSON") from None
     if not isinstance(given, dict):
         raise BadCall(f"the arguments of {call.name} are not a JSON object")

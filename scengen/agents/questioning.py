@@ -9,7 +9,16 @@ from .calls import Calls
 from .facts import Fact, Sheet
 from .grading import PlanGrade, grade_plan, grade_understanding
 from .models import Model, Turn
-from .replies import FormatError, Planned, Understanding, plan, plan_schema, understanding, understanding_schema
+from .replies import (
+    FormatError,
+    Planned,
+    Understanding,
+    plan,
+    plan_schema,
+    understanding,
+    understanding_schema,
+    without_thoughts,
+)
 from .scene import View, prompt, scene_text
 
 Artefact = TypeVar("Artefact")
@@ -102,7 +111,7 @@ def understand(exam: Exam, calls: Calls) -> tuple[Understanding | None, Result]:
     def ask(attempt: int, faults: Sequence[str]) -> tuple[Understanding, list[str]]:
         about = {**exam.about, "stage": UNDERSTAND, "attempt": attempt}
         reply = calls.ask(about, understand_turns(exam, faults), (), schema, exam.temperature, exam.stand_in)
-        found = understanding(reply.text, exam.facts)
+        found = understanding(reply, exam.facts, calls.strict)
         return found, found.faults(exam.facts, frames)
 
     best, attempts, told = _best(ask, UNDERSTAND_ATTEMPTS)
@@ -157,9 +166,9 @@ def make_plan(exam: Exam, artefact: Understanding | None, calls: Calls) -> Resul
         turns = plan_turns(exam, artefact, faults)
         free = calls.ask({**about, "step": "free"}, turns, (), None, exam.temperature, exam.stand_in)
         named = Turn("user", prompt("plan", vocabulary=vocabulary, conditions=conditions))
-        turns = [*turns, Turn("assistant", free.text), named]
+        turns = [*turns, Turn("assistant", free.text if calls.strict else without_thoughts(free.text)), named]
         reply = calls.ask({**about, "step": "named"}, turns, (), schema, exam.temperature, exam.stand_in)
-        found = plan(reply.text, vocabulary)
+        found = plan(reply, vocabulary, calls.strict)
         return found, found.faults(artefact)
 
     best, attempts, told = _best(ask, PLAN_ATTEMPTS)

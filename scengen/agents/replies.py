@@ -1,18 +1,26 @@
 """Replies under their JSON schemas: what stage 1 and stage 2 ask for, and what is wrong with the form of a reply."""
 
 import json
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from ..errors import ScengenError, cut
 from ..work.typed import typed
 from .facts import Fact
+from .models import Reply
 
 T = TypeVar("T")
 METADATA = "metadata"
-"""Name of the evidence that is not a frame: instruction, robot, controller and readings."""
+"""Name of the evidence that is no frame: instruction, robot, controller and readings."""
+LISTS = ("answer", "evidence", "objects", "before", "after")
+"""Entries of replies that are lists of words."""
+MAX_OBJECTS = 100
+"""Largest number of places in a reply at which a JSON object is looked for."""
+FENCE = "```"
+KINDS = ("refused", "cut", "filtered", "empty", "not JSON")
+"""Kinds of replies that cannot be read, the first words of their faults."""
 OTHER = "other"
 """Name of a step that is none of the sub-goals in the vocabulary."""
 
@@ -134,28 +142,73 @@ class Planned:
         return found + [f"your audit {name} failed" for name, passed in vars(self.audit).items() if not passed]
 
 
-def read_json(text: str) -> Any:
-    """The JSON value of a reply; a code fence around it is allowed, nothing else is.
+def read_json(text: str, strict: bool = True) -> Any:
+    """The JSON value of a reply. A code fence around it is allowed.
+
+    Args:
+        strict: whether nothing else is; otherwise thoughts before it are, and words around one JSON object.
 
     Raises:
         FormatError: it is not JSON.
     """
-    fenced = re.fullmatch(r"\s*```(?:json)?\s*(.*?)\s*```\s*", text, re.S)
+    text = text if strict else without_thoughts(text)
     if not text.strip():
-        raise FormatError("the reply is empty")
+        raise FormatError("empty: the reply has no text")
+    whole = text.strip()
+    fenced = len(whole) >= 6 and whole.startswith(FENCE) and whole.endswith(FENCE)
     try:
-        return json.loads(fenced[1] if fenced else text)
+        return json.loads(whole[3:-3].removeprefix("json") if fenced else whole)
     except (ValueError, RecursionError) as error:
-        raise FormatError(f"the reply is not JSON: {cut(str(error))}") from None
+        found = [] if strict else _objects(text)
+        if len(found) == 1:
+            return found[0]
+        why = f"it has {len(found)} objects; give one" if found else cut(str(error))
+        raise FormatError(f"not JSON: {why}") from None
 
 
-def understanding(text: str, facts: Sequence[Fact]) -> Understanding:
+def without_thoughts(text: str) -> str:
+    """A reply without the thoughts before it, of which some endpoints leave out the first tag."""
+    return text.rpartition("</think>")[2]
+
+
+def _objects(text: str) -> list[dict[str, Any]]:
+    """The different JSON objects among the words of a reply; those in code fences if there are any."""
+    fences = text.split(FENCE)[1::2]
+    found = [value for part in (fences or [text])[:MAX_OBJECTS] for value in _objects_in(part)]
+    return [value for number, value in enumerate(found) if value not in found[:number]]
+
+
+def _objects_in(text: str) -> Iterator[dict[str, Any]]:
+    """JSON objects in a text, from left to right, until one is cut short. Other braces are passed over."""
+    at, decoder = text.find("{"), json.JSONDecoder()
+    for _ in range(MAX_OBJECTS):
+        if at < 0:
+            return
+        try:
+            value, end = decoder.raw_decode(text, at)
+        except json.JSONDecodeError as error:
+            if error.pos >= len(text.rstrip()) or error.msg.startswith("Unterminated"):
+                return
+            value, end = {}, at + 1
+        except (ValueError, RecursionError):
+            return
+        if value:
+            yield value
+        at = text.find("{", end)
+
+
+def kind_of(fault: str) -> str:
+    """Kind of a fault of form, see `KINDS`; `form` for a reply in JSON."""
+    return next((kind for kind in KINDS if fault.startswith(f"{kind}:")), "form")
+
+
+def understanding(reply: Reply, facts: Sequence[Fact], strict: bool = True) -> Understanding:
     """Read the artefact of stage 1.
 
     Raises:
         FormatError: it does not follow the schema, answers a question twice, or names what is not a question or option.
     """
-    found = _filled(Understanding, text)
+    found = _filled(Understanding, reply, strict, {fact.id: fact for fact in facts})
     known, told = {fact.id: fact for fact in facts}, [each.fact for each in (*found.semantic, *found.unknown)]
     for name in told:
         if name not in known:
@@ -171,29 +224,52 @@ def understanding(text: str, facts: Sequence[Fact]) -> Understanding:
     return found
 
 
-def plan(text: str, vocabulary: Mapping[str, str]) -> Planned:
+def plan(reply: Reply, vocabulary: Mapping[str, str], strict: bool = True) -> Planned:
     """Read the plan of stage 2.
 
     Raises:
         FormatError: it does not follow the schema, or names a sub-goal that is not in the vocabulary.
     """
-    found = _filled(Planned, text)
+    found = _filled(Planned, reply, strict, {})
     for step in found.steps:
         if step.subgoal not in (*vocabulary, OTHER):
             raise FormatError(f"{cut(repr(step.subgoal))} is not a sub-goal; known: {', '.join((*vocabulary, OTHER))}")
     return found
 
 
-def _filled(cls: type[T], text: str) -> T:
-    plain = read_json(text)
+def _filled(cls: type[T], reply: Reply, strict: bool, facts: Mapping[str, Fact]) -> T:
+    try:
+        plain = read_json(reply.text, strict)
+    except FormatError as error:
+        raise FormatError(reply.ended or str(error)) from None
     if not isinstance(plain, dict):
         raise FormatError("the reply is not a JSON object")
     try:
-        return typed("", cls, plain, exact=True)
+        return typed("", cls, plain if strict else _with_lists(plain, facts), exact=True)
     except FormatError:
         raise
     except (ScengenError, RecursionError) as error:
         raise FormatError(str(error)) from None
+
+
+def _with_lists(plain: Mapping[str, Any], facts: Mapping[str, Fact]) -> dict[str, Any]:
+    """A reply with brackets around single words where lists are expected, and without them around a single number."""
+    found = dict(plain)
+    for group in ("semantic", "steps"):
+        if isinstance(entries := found.get(group), list):
+            found[group] = [_entry(each, facts) if isinstance(each, dict) else each for each in entries]
+    return found
+
+
+def _entry(entry: Mapping[str, Any], facts: Mapping[str, Fact]) -> dict[str, Any]:
+    lists = {name: [entry[name]] for name in LISTS if isinstance(entry.get(name), str)}
+    name, answer = entry.get("fact"), entry.get("answer")
+    if isinstance(name, str) and name in facts and not facts[name].options:
+        lists.pop("answer", None)
+        single: Any = answer[0] if isinstance(answer, list) and len(answer) == 1 else answer
+        with suppress(ValueError, TypeError):
+            lists["answer"] = single if isinstance(single, float | int) else float(single)
+    return {**entry, **lists}
 
 
 def understanding_schema(facts: Sequence[Fact], frames: Sequence[str]) -> dict[str, Any]:

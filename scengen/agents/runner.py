@@ -19,14 +19,17 @@ from ..samplers.split import ID
 from ..samplers.task import Task
 from ..work.limits import at_least
 from ..work.log import Log
+from ..work.plain import read_plain
 from ..work.targets import try_folder, write
 from ..work.typed import typed
 from . import facts
 from .acting import MODES, SEE, act
 from .calls import CALLS, Budget, Calls, OutOfBudget, estimate
+from .endpoint import Endpoint
 from .execution import EXECUTIONS, Executions
 from .facts import SIMPLEST_PLAN, Answer, Fact, Sheet
-from .models import Endpoint, Model, Turn, made
+from .models import Model, RefusedRequest, Turn, made
+from .prices import prices
 from .priors import Prior, priors
 from .questioning import ACT, EMPTY, PLAN, UNDERSTAND, Exam, Result, make_plan, plan_turns, understand, understand_turns
 from .scene import observe, streams
@@ -36,6 +39,8 @@ STAGES = (UNDERSTAND, PLAN, ACT)
 """Numbers of the stages."""
 SETTINGS = "settings.json"
 """Name of the file with the settings of the last run in a folder."""
+MAX_REFUSED = 3
+"""Number of scenarios one after the other whose requests a model refuses, after which a run ends."""
 TRANSCRIPT = "transcript:"
 """Prefix of a model that is the journal of an earlier run."""
 
@@ -50,6 +55,9 @@ class AgentSettings:
     to: str | None = None
     url: str | None = None
     key: str = ""
+    timeout: float = 600.0
+    omit: list[str] = field(default_factory=list)
+    strict: bool = False
     seeds: int = 20
     temperatures: list[float] = field(default_factory=lambda: [0.0])
     pictures: bool = True
@@ -57,6 +65,8 @@ class AgentSettings:
     moments: int = 3
     spacing: float = 0.5
     budget: Budget = Budget()
+    prices: list[float] | str | None = None
+    max_cost: float | None = None
     mode: str = SEE
     explore: int = 0
     execute: bool = True
@@ -76,6 +86,9 @@ class AgentSettings:
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""
         at_least(self, seeds=1, width=16, explore=0)
+        self.budget.check()
+        if not 0.0 < self.timeout <= 86_400.0:
+            raise BadConfig(f"timeout = {self.timeout:g}; it must lie in (0, 86400] s")
         if self.stage not in STAGES:
             raise BadConfig(f"stage = {self.stage}; it must be 1 (understand), 2 (plan) or 3 (act)")
         if self.explore and self.stage != ACT:
@@ -103,7 +116,7 @@ def find_model(settings: AgentSettings) -> Model | None:
     """
     name = settings.model
     if settings.url:
-        return Endpoint(name, settings.url, settings.key)
+        return Endpoint(name, settings.url, settings.key, settings.timeout, settings.omit)
     if name in STAND_INS or name.startswith(TRANSCRIPT):
         return None
     if ":" in name:
@@ -150,7 +163,13 @@ class Outcome:
     calls: int
     """Number of new calls."""
     tokens: int
-    """Tokens of the new calls."""
+    """Tokens of the new calls, as the model counts them."""
+    cost: float | None
+    """Cost of the new calls; None without prices."""
+    notes: Mapping[str, int]
+    """What is to be said about requests, and of how many it is true."""
+    refused: Sequence[str]
+    """Why the model refused requests; the scenarios are in no result, and are asked about again by another run."""
     priors: Mapping[str, Mapping[str, Prior]]
     """Best fixed answers in training and how often they are right, by task and question."""
     stopped: str
@@ -180,14 +199,24 @@ def run(
         Log(path, settings.identity, "choose another to= for another model") as log,
         Log(folder / EXECUTIONS, {"plans": "carried out"}) as played,
     ):
-        calls, executions = Calls(log, model, settings.budget), Executions(played) if settings.execute else None
+        known_prices = prices(settings.prices, settings.model, settings.max_cost)
+        calls = Calls(log, model, settings.budget, known_prices, settings.strict)
+        executions = Executions(played) if settings.execute else None
         if settings.model.startswith(TRANSCRIPT):
             calls.recall(Path(settings.model.removeprefix(TRANSCRIPT)))
         write(folder / SETTINGS, json.dumps(asdict(settings), indent=1) + "\n")
         results, stopped, total = list[dict[str, Any]](), "", len(todo) * len(settings.temperatures)
+        refused, in_a_row = list[str](), 0
         try:
             for work, exam, env in exams(settings, todo, ask, search):
-                found = _stages(settings, exam, calls, env, twins(settings, todo, work))
+                try:
+                    found = _stages(settings, exam, calls, env, twins(settings, todo, work))
+                except RefusedRequest as error:
+                    refused, in_a_row = [*refused, str(error)], in_a_row + 1
+                    if in_a_row == MAX_REFUSED:
+                        raise
+                    continue
+                in_a_row = 0
                 if settings.stage == PLAN and executions:
                     found[-1] = _executed(work, exam, found[-1], executions)
                 results += [{**_labels(work), **each.plain()} for each in found]
@@ -197,7 +226,8 @@ def run(
         write(folder / f"results-{settings.stage}.jsonl", "".join(json.dumps(r) + "\n" for r in results))
         tasks = {work.task.name: work.task for work in todo} if settings.stage != ACT else {}
         known = {name: priors(task, facts.load(task, search)) for name, task in tasks.items()}
-        return Outcome(results, calls.new, calls.tokens, known, stopped)
+        cost = calls.cost if known_prices else None
+        return Outcome(results, calls.new, calls.tokens, cost, calls.notes, refused, known, stopped)
 
 
 def twins(settings: AgentSettings, todo: Sequence[Work], work: Work) -> list[str]:
@@ -312,8 +342,8 @@ def earlier(folder: Path) -> AgentSettings:
         BadConfig: it does not exist.
     """
     try:
-        return typed("", AgentSettings, json.loads((folder / SETTINGS).read_text()))
-    except (OSError, ValueError) as error:
+        return typed("", AgentSettings, json.loads(read_plain(folder / SETTINGS)))
+    except (OSError, ValueError, TypeError, RecursionError) as error:
         raise BadConfig(
             f"{cut(str(folder))} holds no run of scengen agent ({cut(str(error))}); give to=FOLDER"
         ) from None

@@ -87,13 +87,13 @@ class Garbage(StandIn):
     def reply(
         self, turns: Sequence[Turn], tools: Sequence[Tool], schema: Mapping[str, Any], temperature: float, seed: int
     ) -> Reply:
-        """Text, JSON that is cut off, JSON of another form, an unknown question, or the right artefact within text."""
+        """Text, JSON that is cut off, JSON of another form, an unknown question, or two artefacts."""
         right = json.dumps(self.understood())
         strange = json.dumps(
             {"episodic": [], "semantic": [], "unknown": [{"fact": "colour_of_the_sky", "sense": "look"}]}
         )
         return Reply(
-            ("I see a robot.", right[: len(right) // 2], "[1, 2]", "null", strange, f"Sure! {right}")[seed % 6]
+            ("I see a robot.", right[: len(right) // 2], "[1, 2]", "null", strange, f"{right} {strange}")[seed % 6]
         )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from ..episode import STRICT, Actions, Rules, check_rules
 from ..errors import BadConfig, Infeasible, ScengenError, UnknownName
 from ..pool import Pool, PoolRow
-from ..pool.files import sha256, why_not_plain
+from ..pool.files import sha256
 from ..pool.names import Name
 from ..samplers.task import Task
 from ..scenario import Plan, Scenario
@@ -22,6 +22,7 @@ from ..validate.rollout import run
 from ..work.limits import at_least
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
+from ..work.plain import read_plain, why_not_plain
 from ..work.targets import write
 from .adversary import LEAKS, PRIOR, RATED, TIERS, Attack, AttackResult, UntriedShortcut, never
 from .evidence import Hit, TierRate, rates, unsound
@@ -29,6 +30,8 @@ from .experience import Experience, experience, feasible
 from .player import Player
 from .priors import AnswerJudge, Prior, by_statics, fit, has_statics
 
+MAX_HIT = 100_000_000
+"""Size of the largest file of a hit that is read [bytes]: an hour of two arms has 20 MB."""
 GRAMMAR = 6
 """Version of macros and tiers: reports of different versions are not comparable."""
 HITS_FOLDER = "hits"
@@ -289,13 +292,13 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
                 continue
             found = Hit.load(path)
             listed = {key: value for key, value in entry.items() if key not in ("file", "sha256")}
-            if sha256(path.read_bytes()) != entry["sha256"] or json.loads(json.dumps(found.plain())) != listed:
+            if sha256(read_plain(path, MAX_HIT)) != entry["sha256"] or json.loads(json.dumps(found.plain())) != listed:
                 yield entry["file"], "the hit differs from the one that the manifest lists"
             elif found.refutes and found.scenario in ids:
                 yield entry["file"], f"the pool holds {found.scenario}, which this hit refutes"
             elif why := unsound(found, task):
                 yield entry["file"], why
-        except ScengenError as error:
+        except (ScengenError, OSError, ValueError) as error:
             yield entry["file"], str(error)
 
 

@@ -15,7 +15,6 @@ from ..episode import RULES, STRICT, Actions, Rules
 from ..errors import BadConfig, NoOracle, cut
 from ..params import Value, values
 from ..pool.columns import ID, witness
-from ..pool.files import open_plain
 from ..pool.untrusted import (
     MAX_HORIZON,
     READING_MEMORY,
@@ -35,6 +34,7 @@ from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
 from ..validate.settings import Robust
 from ..work.machine import memory_bounded
+from ..work.plain import open_plain
 from ..work.targets import write
 from .player import SETTLE_TIME, Attempt, Node, Played, Player
 from .signature import ContactPair, pairs

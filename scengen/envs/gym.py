@@ -46,7 +46,7 @@ from .observations import (
     streams_of,
     turns_pictures,
 )
-from .pools import Folders, chosen, rows_of
+from .pools import Folders, chosen, located, rows_of
 
 Observation = dict[str, Reading]
 
@@ -178,6 +178,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.rules: Rules = rules
         self.task: Task = compose.load_task(task, search)
         rows = rows_of(pool, task)
+        self._arguments["pool"] = located(pool)
         self._rows = chosen(rows, scenario, split)
         names = [observations] if isinstance(observations, str) else observations
         names = proprioception(self.task.embodiment) if names is None else names

@@ -34,6 +34,13 @@ def rows_of(pool: Folders | Library[PoolRow] | None, task: str) -> Library[PoolR
     return Library([_checked(Pool.open(each), task) for folder in folders for each in _pools_of_task(folder, task)])
 
 
+def located(pool: Folders | Library[PoolRow] | None) -> Folders | Library[PoolRow] | None:
+    """Folders by their absolute paths, which hold wherever a process goes or starts."""
+    if isinstance(pool, (str, Path)):
+        return Path(pool).absolute()
+    return pool if pool is None or isinstance(pool, Library) else [Path(each).absolute() for each in pool]
+
+
 def scenes_of(pool: Folders, task: str) -> Library[Any]:
     """The scenarios of some pools or demonstrations, for environments that need no certificate.
 

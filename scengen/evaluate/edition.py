@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import yaml
-
 from ..compose import certify_levels, load_task
 from ..errors import BadConfig, Infeasible, PoolError, UnknownName, cut
 from ..installation import versions
@@ -25,6 +23,7 @@ from ..samplers.task_files import about, conf_dir, tasks
 from ..sim import scene_text
 from ..validate.rebuilt import portable_sha256, rebuild
 from ..work.parallel import Workers
+from ..work.plain import read_yaml
 from ..work.targets import write
 from ..work.typed import typed
 
@@ -123,15 +122,10 @@ class Edition:
             ScengenError: there is no such file, or it is not an edition.
         """
         path = path_of(name)
-        if not path.is_file():
+        if not path.exists() or path.is_dir():
             known = sorted(file.stem for file in (conf_dir() / "editions").glob("*.yaml"))
             raise UnknownName("edition", name, [*known, "FILE.yaml"])
-        try:
-            node = yaml.safe_load(path.read_text())
-        except (yaml.YAMLError, ValueError, OSError, RecursionError) as error:
-            raise BadConfig(f"edition = {path}; it is not YAML ({cut(' '.join(str(error).split()))})") from None
-        if not isinstance(node, Mapping) or not all(isinstance(key, str) for key in node):
-            raise BadConfig(f"edition = {path}; it must be a group of settings, as scengen edition writes it")
+        node = read_yaml("edition", path)
         if (given := node.get("format")) != FORMAT:
             given = cut(repr(given), 20)
             raise BadConfig(f"{path} has format {given}; this version reads format {FORMAT}; install another one")

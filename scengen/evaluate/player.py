@@ -21,6 +21,7 @@ from ..samplers.split import ID
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from .policies import REPLAY, Policy, find_policy, identity, make_policy, policy_errors
+from .remote.policy import RemotePolicy
 from .settings import EvaluateSettings, RolloutId
 
 A = TypeVar("A")
@@ -136,12 +137,14 @@ class PolicyPlayer:
         except ValueError as error:
             raise BadPolicy(f"policy {self.settings.name} {rollout.where}: {error}") from None
 
-    def identities(self, tasks: set[str]) -> dict[str, str]:
-        """Hashes of the policy by task, see `policies.identity`."""
+    def identities(self, tasks: set[str]) -> dict[str, Any]:
+        """Hashes of the policy by task, see `policies.identity`; of a server its description of itself."""
         return {task: self._identity(task) for task in sorted(tasks)}
 
-    def _identity(self, task: str) -> str:
+    def _identity(self, task: str) -> Any:
         _, policies = self._prepared_for(task)
+        if isinstance(policies[0], RemotePolicy):
+            return policies[0].described()
         factory = find_policy(self.settings.name, client=self.settings.remote)
         return identity(self.settings.name, factory, policies[0])
 

@@ -171,7 +171,15 @@ def find_policy(name: str, memory: Library | None = None, client: ClientSettings
     if client is not None and is_address(name):
         return lambda env: RemotePolicy(env, name, client)
     if not is_factory(name):
-        known = [*BUILT_IN, REPLAY, "module:factory", "a folder", "ws://HOST:PORT", "zmq://HOST:PORT"]
+        known = [
+            *BUILT_IN,
+            REPLAY,
+            "module:factory",
+            "a folder",
+            "ws://HOST:PORT",
+            "wss://HOST:PORT",
+            "zmq://HOST:PORT",
+        ]
         raise UnknownName("policy", name, known)
     return factory_of("policy", name)
 

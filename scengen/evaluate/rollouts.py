@@ -73,7 +73,8 @@ def evaluate(
     remedy = "pass fresh=true to start again (old episodes are moved aside), or choose another to="
     with closing(PolicyPlayer(settings, search)) as player:
         versions = {a["task"]: a["task_version"] for a in about.values()}
-        depends = {**_identity(settings, pools), "task_versions": versions, "code": player.identities({*versions})}
+        code = {"server" if settings.remote else "code": player.identities({*versions})}
+        depends = {**_identity(settings, pools), "task_versions": versions, **code}
         if settings.fresh:
             _move_aside(path)
         with Log(path, depends, remedy) as log:

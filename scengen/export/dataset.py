@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from ..episode import STRICT, Rules, check_rules
 from ..errors import PoolError
-from ..pool.files import MAX_JSON, open_plain
+from ..pool.files import MAX_JSON
 from ..pool.shards import check_groups
 from ..pool.untrusted import READING_MEMORY
 from ..work.machine import memory_bounded
+from ..work.plain import open_plain
 from .lerobot import VIDEO_PATH
 
 TASK_VERSION = "scengen/task_version"

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from ..control.loop import Loop
 from ..errors import BadConfig, PoolError, ScengenError, UnknownName, cut
-from ..pool.files import read_json_file, sha256, sha256_of_file
+from ..pool.files import read_json_file, sha256
 from ..pool.untrusted import HASH, WORD, check_match, check_text, check_versions, check_whole, demand
 from ..sim.embodiment import EMBODIMENTS, action_size
+from ..work.plain import read_plain
 from ..work.targets import write
 from ..work.typed import typed
 from .features import Features, number_names
@@ -51,6 +52,8 @@ MAX_WIDTH = 100_000
 """Largest number of units of a hidden layer."""
 MAX_WEIGHTS = 2_000_000_000
 """Size of the largest file of weights that is read [bytes]."""
+MAX_HEADERS = 1_000_000
+"""Largest size of everything in a file of weights but the weights [bytes]."""
 MAX_ROWS = 100_000_000
 """Largest number of rows of the demonstrations."""
 
@@ -174,9 +177,10 @@ class StoredPolicy:
         settings = read_settings(folder)
         path = Path(folder, WEIGHTS)
         try:
-            if sha256_of_file(path) != settings.weights_sha256:
+            content = read_plain(path, MAX_WEIGHTS + MAX_HEADERS)
+            if sha256(content) != settings.weights_sha256:
                 raise Broken(f"its sha256 is not that in {SETTINGS}")
-            arrays = read_arrays(path, settings.shapes)
+            arrays = read_arrays(io.BytesIO(content), settings.shapes)
         except (OSError, ValueError) as error:
             raise PoolError(f"{path} is damaged ({_cause(error)}); restore it, or train the policy again") from None
         return cls(settings, arrays)
@@ -248,7 +252,7 @@ def network_shapes(
     return found
 
 
-def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, NDArray[np.float32]]:
+def read_arrays(path: Path | io.BytesIO, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, NDArray[np.float32]]:
     """Arrays of known shapes. The shape in a header is compared before memory is taken for it.
 
     Raises:

@@ -12,6 +12,7 @@ from ..samplers.axis import Proof
 from ..samplers.task import Task
 from ..work.limits import at_least
 from ..work.parallel import Workers
+from ..work.plain import read_plain
 from . import behaviour, boundary, features
 from .analysis.distance import Energy
 from .baseline import Baseline
@@ -111,9 +112,9 @@ def read_card(path: Path) -> dict[str, Any]:
         BadConfig: the file cannot be read, or is a card of another format.
     """
     try:
-        card = json.loads(path.read_text())
+        card = json.loads(read_plain(path))
         made, task, axis = card.get("format", 1), card["task"], card["axis"]
-    except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
+    except (OSError, ValueError, AttributeError, KeyError, TypeError, RecursionError) as error:
         raise BadConfig(f"{path} is not the card of an axis: {type(error).__name__} {cut(str(error))}") from None
     if made != FORMAT:
         remedy = f"scengen axis card task={task} axis={axis} writes it again, and plays only what is missing"

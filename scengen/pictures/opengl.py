@@ -5,24 +5,68 @@ next picture may be taken in another thread, and so that no context receives the
 """
 
 import atexit
+import ctypes
+import os
 import sys
 import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco import MjModel
 
-from ..errors import BadConfig, cut
+from ..errors import BadConfig, ScengenError, cut
 
 LARGEST_EDGE = 4096
 """Largest width and height of a picture [pixels], which OpenGL supports on all machines."""
 
 _open_renderers: "weakref.WeakSet[Renderer]" = weakref.WeakSet()
 """Renderers that are to be closed at the end of the process."""
+
+
+class Forked(ScengenError):
+    """A process was forked after a picture was taken."""
+
+
+def check_process() -> None:
+    """Raise `Forked` in a process that was forked from one with OpenGL: without its threads a picture never ends."""
+    if _forked:
+        why = "this process was forked from one that has taken a picture, and OpenGL has only half survived that"
+        raise Forked(f'{why}; start processes with spawn: multiprocessing.get_context("spawn"), context="spawn"')
+
+
+_forked = False
+"""Whether this process was forked from one that had OpenGL."""
+
+
+def _leave_to_the_parent() -> None:
+    """Leave the renderers of the process that was forked alone: to free them here would wait for its threads."""
+    global _forked
+    if _forked or not _close_at_exit.cache_info().currsize:
+        return
+    _forked, sys.excepthook = True, partial(_end_at_once, sys.excepthook)
+    for renderer in list(_open_renderers):
+        for part in (renderer._gl_context, renderer._mjr_context):
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(part))
+        renderer._gl_context = renderer._mjr_context = None
+    _open_renderers.clear()
+    if backend := sys.modules.get("mujoco.egl"):
+        atexit.unregister(backend.EGL.eglTerminate)
+
+
+def _end_at_once(hook: Any, *error: Any) -> None:
+    """Show the error that ends a forked process, and end it: the handlers of OpenGL would wait for missing threads."""
+    hook(*error)
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(1)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_leave_to_the_parent)
 
 
 def check_size(**edges: int) -> None:
@@ -67,8 +111,10 @@ class Renderer(mujoco.Renderer):
         """Make a context, with buffers that are large enough for the picture.
 
         Raises:
+            Forked: this process was forked from one with OpenGL.
             Exception: OpenGL is missing. The type depends on platform and back end.
         """
+        check_process()
         buffers = model.vis.global_
         buffers.offwidth, buffers.offheight = max(buffers.offwidth, width), max(buffers.offheight, height)
         super().__init__(model, height, width)
@@ -77,6 +123,7 @@ class Renderer(mujoco.Renderer):
         _open_renderers.add(self)
 
     def render(self, *, out: Any = None) -> Any:
+        check_process()
         try:
             return super().render(out=out)
         finally:

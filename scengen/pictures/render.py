@@ -257,7 +257,9 @@ def box_of(world: World, geom: int, scale: float = 1.0) -> NDArray[np.float64]:
 
 
 def check_pictures() -> None:
-    """Raise `NoPictures` if OpenGL would end the process: without a display, or with too little address space."""
+    """Raise `NoPictures` if OpenGL would end the process: without a display, or with too little address space; `Forked`
+    if it would not answer."""
+    opengl.check_process()
     if "glfw" in gl_context.GLContext.__module__ and sys.platform == "linux" and not os.environ.get("DISPLAY"):
         raise NoPictures(
             "no OpenGL for pictures without a display; on Debian install libegl1 libgl1 libosmesa6, and set "

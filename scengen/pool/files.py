@@ -1,14 +1,13 @@
 """Files of a pool: their hashes, how they are replaced, and which of them are opened at all."""
 
-import errno
 import hashlib
 import os
-import stat
 from dataclasses import dataclass
 from io import BufferedReader
 from pathlib import Path
 from typing import Any, Self
 
+from ..work.plain import POINTER, is_pointer, open_plain, read_opened
 from . import untrusted
 
 MAX_JSON = 16_000_000
@@ -21,8 +20,13 @@ def sha256(content: str | bytes) -> str:
 
 
 def sha256_of_file(path: Path) -> str:
-    """Hash of a file, in hex."""
-    with open(path, "rb") as file:
+    """Hash of a file, in hex.
+
+    Raises:
+        ValueError: it is no plain file.
+        OSError: it cannot be read.
+    """
+    with open_plain(Path(os.path.realpath(path))) as file:
         return sha256_of_opened(file)
 
 
@@ -73,6 +77,8 @@ def why_damaged(folder: Path, entry: FileEntry, identities: dict[Path, Identity]
     try:
         with open_plain(path) as file:
             identity = Identity.of(file)
+            if is_pointer(file):
+                return POINTER
             if identity.size != entry.bytes:
                 return f"has {identity.size} bytes instead of {entry.bytes}: truncated"
             if sha256_of_opened(file) != entry.sha256:
@@ -95,42 +101,6 @@ def replace_file(path: Path, content: bytes) -> None:
         part.unlink(missing_ok=True)
 
 
-def why_not_plain(path: Path) -> str:
-    """Why a file of a pool is not opened; empty if it is. Links, pipes and devices are not."""
-    try:
-        mode = os.lstat(path).st_mode
-    except OSError:
-        return _MISSING
-    return "" if stat.S_ISREG(mode) else _NOT_PLAIN
-
-
-def open_plain(path: Path) -> BufferedReader:
-    """Open a plain file for reading. Nothing that waits, leads elsewhere or never ends is opened.
-
-    Raises:
-        ValueError: it is missing, or a link, a pipe or a device.
-        OSError: it cannot be opened.
-    """
-    try:
-        descriptor = os.open(path, _FLAGS)
-    except OSError as error:
-        if error.errno == errno.ENOENT:
-            raise ValueError(f"it {_MISSING}") from None
-        if error.errno in (errno.ELOOP, errno.ENXIO):  # a link; a socket, or a device without a driver
-            raise ValueError(f"it {_NOT_PLAIN}") from None
-        raise
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-        os.close(descriptor)
-        raise ValueError(f"it {_NOT_PLAIN}")
-    return open(descriptor, "rb")
-
-
-_FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
-"""How files are opened. Each platform has some of these flags; Windows follows links."""
-_MISSING = "is missing"
-_NOT_PLAIN = "is not a plain file"
-
-
 def read_json_file(path: Path) -> Any:
     """Content of a JSON file beside the shards: a manifest, or an index.
 
@@ -139,6 +109,4 @@ def read_json_file(path: Path) -> Any:
         OSError: it cannot be read.
     """
     with open_plain(path) as file:
-        if (size := os.fstat(file.fileno()).st_size) > MAX_JSON:
-            raise ValueError(f"it has {size} bytes; at most {MAX_JSON} are read")
-        return untrusted.read_json(file.read(MAX_JSON + 1).decode(), MAX_JSON)
+        return untrusted.read_json(read_opened(file, MAX_JSON).decode(), MAX_JSON)

@@ -56,6 +56,14 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
     REMEDY: ClassVar[str]
     """How the rows are made again, for errors."""
 
+    @cached_property
+    def _home(self) -> Path:
+        """The folder, wherever the process goes afterwards."""
+        return self.folder.absolute()
+
+    def __post_init__(self) -> None:
+        _ = self._home
+
     def __len__(self) -> int:
         """Number of rows, by the manifest."""
         return sum(entry.rows for entry in self.manifest.shards)
@@ -74,12 +82,12 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
     @property
     def sha256(self) -> str:
         """Hash of the manifest, which holds the hash of every file: equal hashes mean equal rows."""
-        return sha256_of_file(self.folder / self.MANIFEST)
+        return sha256_of_file(self._home / self.MANIFEST)
 
     def damaged(self) -> dict[str, str]:
         """Faults of the files, by name; empty if there are none. From now on only the very files are read that were
         compared: a file that is replaced or written afterwards cannot be read."""
-        faults = ((entry.file, why_damaged(self.folder, entry, self._identities)) for entry in self.manifest.files)
+        faults = ((entry.file, why_damaged(self._home, entry, self._identities)) for entry in self.manifest.files)
         return {name: why for name, why in faults if why}
 
     def check(self) -> Self:
@@ -204,7 +212,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         return Reader([self._shard(entry) for entry in self.manifest.shards])
 
     def _shard(self, entry: FileEntry) -> Shard:
-        return Shard(self.folder / entry.file, entry.rows, self._identities, layout(self.ROW))
+        return Shard(self._home / entry.file, entry.rows, self._identities, layout(self.ROW))
 
     def __getstate__(self) -> dict[str, Any]:
         """What goes to another process: where the rows are, and not what was read of them."""

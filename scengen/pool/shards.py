@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from ..errors import PoolError
 from ..work.machine import memory_bounded
+from ..work.plain import open_plain
 from . import columns
 from .columns import ID, check_robot
-from .files import MAX_JSON, Identity, open_plain
+from .files import MAX_JSON, Identity
 from .manifest import FORMAT
 from .row import Layout, PoolRow, layout
 from .untrusted import READING_MEMORY

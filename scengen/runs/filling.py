@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..pool import writing
-from ..pool.files import sha256, sha256_of_file, why_not_plain
+from ..pool.files import sha256, sha256_of_file
 from ..pool.manifest import FileEntry
+from ..work.plain import why_not_plain
 from .journal import Journal, Record
 
 

@@ -72,7 +72,7 @@ class Guard:
                 return _answer(HTTPStatus.OK, self._scripts[path], {"Content-Type": "application/javascript"} | HEADERS)
             is_page = path == "/"
             if is_page:  # it is changed below, which is simpler before it is packed
-                del request.headers["Accept-Encoding"]
+                request.headers.pop("Accept-Encoding", None)
             response = answer(connection, request)
             if is_page:
                 response.body = self._page(response.body)

@@ -14,8 +14,8 @@ from typing import Any
 from llvmlite import binding
 
 from ..errors import PoolError
-from ..pool.files import why_not_plain
 from ..scenario import Scenario
+from ..work.plain import why_not_plain
 from ..work.targets import write
 from .identity import packages
 

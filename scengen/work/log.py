@@ -1,6 +1,7 @@
 """Log of a long run, one result per line: it survives a kill, and a repeated run continues from it."""
 
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -9,6 +10,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from ..errors import BadConfig
+from .plain import MAX_JOURNAL, read_plain
 from .targets import refused
 
 
@@ -65,13 +67,16 @@ class Log:
 
     def _open(self) -> None:
         """Read the file and prepare it for more records. A line that a kill has cut short is dropped."""
-        content = self.path.read_bytes() if self.path.exists() else b""
+        try:
+            content = read_plain(self.path, MAX_JOURNAL) if os.path.lexists(self.path) else b""
+        except ValueError as error:
+            raise BadConfig(f"{self.path} cannot be continued: {error}; choose another to=") from None
         size = content.rfind(b"\n") + 1
         try:
             whole = [json.loads(line) for line in content[:size].splitlines()]
             if not all(isinstance(record, dict) for record in whole):
                 raise ValueError("a record is not a mapping")
-        except ValueError:
+        except (ValueError, RecursionError):
             why = "is damaged; move it aside (do not delete it) to start over, or choose another to="
             raise BadConfig(f"{self.path} {why}") from None
         if whole and whole[0] != self.identity:

@@ -22,6 +22,7 @@ def serving(answers):
             requests.append((self.path, dict(self.headers), body))
             answer = answer(body) if callable(answer) else answer
             status, told = (answer, {"error": "busy"}) if isinstance(answer, int) else (200, answer)
+            status, told = told if isinstance(told, tuple) else (status, told)
             if isinstance(told, str):
                 usage = {"prompt_tokens": 100, "completion_tokens": 10}
                 told = {"choices": [{"message": {"content": told}}], "usage": usage}

@@ -6,8 +6,9 @@ import sys
 import pytest
 from endpoint import serving
 
-from scengen.agents import models
-from scengen.agents.models import Call, Endpoint, ModelError, Reply, Tool, Turn, made
+from scengen.agents import endpoint as models
+from scengen.agents.endpoint import Endpoint
+from scengen.agents.models import Call, ModelError, Reply, Tool, Turn, made
 from scengen.errors import BadConfig, ForeignCode
 
 TURNS = [Turn("system", "Be brief."), Turn("user", "What is this?", (b"\xff\xd8 a picture",))]

@@ -223,7 +223,7 @@ def test_a_message_with_anything_but_bounded_numbers_is_refused(node):
 @pytest.mark.parametrize(
     ("argv", "says"),
     [
-        (("policy=http://localhost:8000",), "it must be ws://HOST:PORT (openpi) or zmq://HOST:PORT (GR00T)"),
+        (("policy=http://localhost:8000",), "it must be ws://HOST:PORT or wss://HOST:PORT (openpi), or zmq"),
         (("policy=ws://localhost",), "it must be ws://HOST:PORT"),
         (("policy=ws://user:word@localhost:8000",), "it must be ws://HOST:PORT"),
         (("policy=ws://localhost:99999",), "it must be ws://HOST:PORT"),

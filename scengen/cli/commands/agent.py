@@ -8,7 +8,9 @@ from pathlib import Path
 from rich.table import Table
 
 from ...agents.page import TITLES, write_page
+from ...agents.prices import prices
 from ...agents.questioning import PLAN, UNDERSTAND
+from ...agents.replies import kind_of
 from ...agents.runner import AgentSettings, Outcome, earlier, prompts, run
 from ...agents.tables import agreement, executed_lines, lines, lost_in_twins, markdown, plan_errors, sight_lines
 from ...errors import BadConfig
@@ -50,7 +52,7 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
     """Print and write the tables of a run."""
     folder, printed = settings.folder, {}
     if not found.results:
-        raise BadConfig(f"nothing was graded: {found.stopped}")
+        raise BadConfig(f"nothing was graded: {found.stopped or found.refused[-1]}")
     for stage in sorted({result["stage"] for result in found.results}):
         rows, title = lines(found.results, stage), f"{settings.model}: {TITLES[stage]}, right [%]"
         _print(title, rows)
@@ -72,18 +74,24 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
             _show_executed(settings, found)
     if errors := plan_errors(found.results):
         say("plans with errors: " + ", ".join(f"{kind} {count}" for kind, count in sorted(errors.items())))
-    formats = Counter(result["stage"] for result in found.results if result["format_error"])
-    for stage, count in sorted(formats.items()):
-        say(f"{TITLES[stage]}: {count} replies had no valid form")
+    formats = [(r["stage"], kind_of(r["format_error"])) for r in found.results if r["format_error"]]
+    for (stage, kind), count in sorted(Counter(formats).items()):
+        say(f"{TITLES[stage]}: {count} replies had no valid form ({kind})")
+    for note, count in sorted(found.notes.items()):
+        say(f"{note} ({count} calls)")
     versions = {result["task"]: result["task_version"] for result in found.results}
-    about = {"model": settings.model, "task_versions": versions, "stages": printed}
+    read_as = {"strict": settings.strict, "notes": dict(found.notes), "refused": len(found.refused)}
+    about = {"model": settings.model, "task_versions": versions, **read_as, "stages": printed}
     write_json(str(folder / f"table-{settings.stage}.json"), about)
     page = write_page(folder, found.results, settings.model, found.priors)
-    say(f"{found.calls} new calls, {found.tokens} tokens; wrote {page} and tables beside it")
+    cost = "" if found.cost is None else f", cost {found.cost:.4g}"
+    say(f"{found.calls} new calls, {found.tokens} tokens{cost}; wrote {page} and tables beside it")
+    if found.refused:
+        count = len(found.refused)
+        remark(f"{count} scenarios are in no table, as requests were refused; the last one: {found.refused[-1]}")
     if found.stopped:
         remark(f"stopped early: {found.stopped}")
-        return FAILED
-    return OK
+    return FAILED if found.stopped or found.refused else OK
 
 
 def _show_executed(settings: AgentSettings, found: Outcome) -> None:
@@ -125,5 +133,7 @@ def _dry(settings: AgentSettings, search: Sequence[str]) -> int:
     per = {1: 1, 2: 3, 3: 24 * (1 + settings.explore)}[settings.stage]
     say(f"{count} prompts in {settings.folder / 'prompts'}; nothing was asked")
     total = f"{per * tokens[0]} tokens of prompts, {per * tokens[1]} of answers"
-    say(f"estimate without repeated attempts: {count * per} calls, {total}")
+    known = prices(settings.prices, settings.model, settings.max_cost)
+    cost = f", cost {known.of((per * tokens[0], per * tokens[1])):.4g}" if known else ""
+    say(f"estimate without repeated attempts: {count * per} calls, {total}{cost}")
     return OK

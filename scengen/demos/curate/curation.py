@@ -26,7 +26,7 @@ from ...errors import PoolError
 from ...export.dataset import EpisodeData, Recording
 from ...export.recording import CONTROL_ACTIONS
 from ...export.streams import ENVIRONMENT
-from ...pool.files import replace_file, sha256
+from ...pool.files import read_json_file, replace_file, sha256
 from ...work.parallel import UNTRUSTED_LIMITS, Workers, each
 from .checks import Subject, check_rows, found
 from .findings import REPORTS, SCHEMA, EpisodeReport, Finding, read_reports
@@ -225,7 +225,7 @@ def _write(curated: Curated, folder: Path) -> None:
     replace_file(folder / "report.schema.json", _json(SCHEMA))
     replace_file(folder / "kept.json", _json(list(curated.kept)))
     about = curated.recording.folder / "meta" / "scengen.json"
-    source = json.loads(about.read_text()) if about.is_file() else {}
+    source = read_json_file(about) if about.is_file() else {}
     funnel = {**curated.funnel, "undecided": len(curated.undecided)}
     replace_file(about, _json({**source, "curation": {"funnel": funnel, "kept_score": KEPT_SCORE}}))
 

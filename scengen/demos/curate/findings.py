@@ -7,11 +7,14 @@ from typing import Any, Literal
 
 from ...errors import PoolError
 from ...pool.untrusted import check_text, check_whole, demand, read_json
+from ...work.plain import read_plain
 
 REPORTS = "reports.jsonl"
 """File of the reports of a curation."""
 Severity = Literal["error", "warning"]
 """`error`: the episode stays out unless a person accepts it. `warning`: worth a look, and no reason to stay out."""
+MAX_REPORTS = 1_000_000_000
+"""Size of the largest file of reports that is read [bytes]: ten thousand episodes have 20 MB."""
 
 
 @dataclass(frozen=True)
@@ -66,10 +69,10 @@ def read_reports(path: Path) -> list[EpisodeReport]:
     Raises:
         PoolError: it does not exist, or it holds something else.
     """
+    if not path.exists():
+        raise PoolError(f"no reports at {path}; run scengen curate first")
     try:
-        return [_report(read_json(line)) for line in path.read_text().splitlines()]
-    except FileNotFoundError:
-        raise PoolError(f"no reports at {path}; run scengen curate first") from None
+        return [_report(read_json(line)) for line in read_plain(path, MAX_REPORTS).decode().splitlines()]
     except (OSError, ValueError, TypeError, KeyError) as error:
         why = " ".join(str(error).split())[:120]
         raise PoolError(f"{path} is damaged ({why}); run scengen curate again") from None

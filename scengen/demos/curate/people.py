@@ -10,6 +10,7 @@ from filelock import FileLock
 
 from ...errors import BadConfig, PoolError, UnknownName, cut
 from ...pool.files import replace_file
+from ...work.plain import read_plain
 
 SCORES = "scores.csv"
 DECISIONS = "decisions.csv"
@@ -74,13 +75,10 @@ def _table(path: Path, columns: Sequence[str], count: int) -> list[tuple[int, di
     if not path.exists():
         return []
     try:
-        if path.stat().st_size > MAX_CSV:
-            raise PoolError(f"{path} has more than {MAX_CSV} bytes; it is not a table of episodes")
-        with open(path, newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file)
-            rows = [(reader.line_num, {name: str(row.get(name) or "") for name in columns}) for row in reader]
-            named = reader.fieldnames or []
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reader = csv.DictReader(io.StringIO(read_plain(path, MAX_CSV).decode(), newline=""))
+        rows = [(reader.line_num, {name: str(row.get(name) or "") for name in columns}) for row in reader]
+        named = reader.fieldnames or []
+    except (OSError, ValueError, csv.Error) as error:
         raise PoolError(f"{path} cannot be read ({' '.join(str(error).split())[:120]}); correct or remove it") from None
     if missing := [name for name in columns if name not in named]:
         raise BadConfig(f"{path} lacks the column {missing[0]}; its first line must be {','.join(columns)}")

@@ -9,6 +9,7 @@ from pathlib import Path
 from ...control.loop import Loop
 from ...errors import BadConfig, UnknownName, cut
 from ...pool.untrusted import Malformed, read_json
+from ...work.plain import read_plain
 
 STICKS = ("leftx", "lefty", "rightx", "righty")
 """Axes of the two sticks, in [-1, 1]; right and down are positive. All names are those of SDL's mappings."""
@@ -96,11 +97,10 @@ def read_events(path: Path) -> TimedEvents:
         BadConfig: the file is missing or too large, or a line is not an event.
     """
     try:
-        if path.stat().st_size > MAX_FILE:
-            raise BadConfig(f"{cut(str(path))} has more than {MAX_FILE} bytes; it is not a file of events")
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        why = " ".join(str(getattr(error, "strerror", "") or "it is not a text").split()).lower()
+        lines = read_plain(path, MAX_FILE).decode().splitlines()
+    except (OSError, ValueError) as error:
+        what = "it is no text" if isinstance(error, UnicodeDecodeError) else str(error)
+        why = " ".join((getattr(error, "strerror", "") or what).split()).lower()
         raise BadConfig(f"{cut(str(path))} cannot be read: {why}; give a file of JSON lines, script:FILE") from None
     found: TimedEvents = {}
     last = 0

@@ -1,20 +1,21 @@
 """Files that name observations and actions for a policy server: conf/clients/*.yaml, or your own file."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import yaml
-
 from ...envs.gym import action_repeat_at
 from ...envs.observations import proprioception
 from ...errors import BadConfig, UnknownName, cut
 from ...samplers.task_files import conf_dir
+from ...work.plain import read_yaml
+from ...work.secrets import secret, shown
 from ...work.typed import typed
 
-PROTOCOLS = {"ws": "openpi", "zmq": "gr00t"}
+PROTOCOLS = {"ws": "openpi", "wss": "openpi", "zmq": "gr00t"}
 """Names of the protocols, and of their files in conf/clients, by the scheme of an address."""
 INSTRUCTION = "instruction"
 """Name of the instruction of the running scenario among the observations of a file."""
@@ -24,10 +25,10 @@ PROPRIOCEPTION = "proprioception"
 
 @dataclass(frozen=True)
 class Address:
-    """Address of a policy server: `ws://HOST:PORT` or `zmq://HOST:PORT`."""
+    """Address of a policy server: `ws://HOST:PORT`, `wss://HOST:PORT` or `zmq://HOST:PORT`."""
 
     scheme: str
-    """Scheme: `ws` or `zmq`."""
+    """Scheme: `ws`, `wss` or `zmq`."""
     host: str
     """Name or number of the host."""
     port: int
@@ -53,7 +54,7 @@ def address_of(policy: str) -> Address:
     Raises:
         BadConfig: it is not one that is accepted.
     """
-    accepted = "; it must be ws://HOST:PORT (openpi) or zmq://HOST:PORT (GR00T)"
+    accepted = "; it must be ws://HOST:PORT or wss://HOST:PORT (openpi), or zmq://HOST:PORT (GR00T)"
     try:
         parts = urlsplit(policy)
         host, port = parts.hostname, parts.port
@@ -61,7 +62,7 @@ def address_of(policy: str) -> Address:
         host, port, parts = None, None, urlsplit("")
     whole = not (parts.username or parts.password or parts.query or parts.fragment or parts.path.strip("/"))
     if parts.scheme not in PROTOCOLS or not host or not port or not whole:
-        raise BadConfig(f"policy = {cut(policy)}{accepted}")
+        raise BadConfig(f"policy = {shown(policy)}{accepted}")
     return Address(parts.scheme, host, port)
 
 
@@ -83,6 +84,10 @@ class ClientSettings:
     """Streams and cameras that are joined into an entry of the request, by the name of the entry."""
     action: list[str]
     """Entries of the reply that are joined, along their last axis, into an action of the environment."""
+    key: str = ""
+    """Name of the environment variable that holds the server's key; empty for a server without keys."""
+    headers: Mapping[str, str] = field(default_factory=dict)
+    """Further headers of a websocket: names of the environment variables that hold their values."""
     file: str = field(default="", compare=False)
     """Path of the file."""
 
@@ -107,6 +112,17 @@ class ClientSettings:
         """The settings on which the outcome of an episode depends."""
         return {"rate": self.rate, "execute": self.execute, "observation": self.observation, "action": self.action}
 
+    def secrets(self) -> tuple[str, dict[str, str]]:
+        """The key, and the values of the headers by name.
+
+        Raises:
+            BadConfig: an environment variable is missing, or a header is none.
+        """
+        if odd := [name for name in self.headers if not re.fullmatch(r"[A-Za-z0-9-]{1,100}", name)]:
+            raise BadConfig(f"{self.file}: headers has {cut(repr(odd[0]))}; a name has letters, digits and hyphens")
+        values = {name: secret(f"{self.file}: headers.{name}", of) for name, of in self.headers.items()}
+        return secret(f"{self.file}: key", self.key), values
+
     def check(self) -> None:
         """Raise `BadConfig` if a setting is not valid."""
         where = self.file
@@ -121,6 +137,7 @@ class ClientSettings:
             if not names or (INSTRUCTION in names and len(names) > 1):
                 why = f"it must name streams that can be joined, a camera, or {INSTRUCTION} alone"
                 raise BadConfig(f"{where}: observation.{entry} = {names}; {why}")
+        self.secrets()
         if not self.action:
             raise BadConfig(f"{where}: action = []; name the entries of the reply that hold the actions")
 
@@ -138,14 +155,9 @@ def read_client(name: str | None, address: Address) -> ClientSettings:
     known = sorted(path.stem for path in folder.glob("*.yaml"))
     name = name or PROTOCOLS[address.scheme]
     path = folder / f"{name}.yaml" if name in known else Path(name)
-    if not path.is_file():
+    if not path.exists() or path.is_dir():
         raise UnknownName("client", name, [*known, "FILE.yaml"])
-    try:
-        node = yaml.safe_load(path.read_text())
-    except (yaml.YAMLError, ValueError, OSError, RecursionError) as error:
-        raise BadConfig(f"client = {path}; it is not YAML ({cut(' '.join(str(error).split()))})") from None
-    if not isinstance(node, Mapping) or not all(isinstance(key, str) for key in node):
-        raise BadConfig(f"client = {path}; it must be a group of settings, as in conf/clients/openpi.yaml")
+    node = read_yaml("client", path)
     if "file" in node:
         raise UnknownName(
             f"key of {path}", "file", [key for key in ClientSettings.__dataclass_fields__ if key != "file"]

@@ -1,7 +1,5 @@
 """A policy behind a socket: it sends observations under the server's names and plays the chunks of actions it gets."""
 
-import hashlib
-import json
 from collections import deque
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +12,7 @@ from ...envs.gym import Observation, PoolEnv
 from ...errors import UnknownName, cut
 from ...sim.embodiment import hands
 from .client import INSTRUCTION, ClientSettings, address_of
-from .servers import SERVERS, Server
+from .servers import SERVERS, Server, plain
 
 RATES = ("fps", "control_hz")
 """Names under which a server's description may give the rate of its actions [Hz]."""
@@ -50,10 +48,9 @@ class RemotePolicy:
         self._history: deque[Observation] = deque(maxlen=1 - min(map(min, self._past.values()), default=0))
         self._plan: deque[NDArray[np.float32]] = deque()
 
-    def identity(self) -> str:
-        """Digest of the client's settings and of the server's description of itself."""
-        known = {"client": self.client.identity(), "server": self.server.about}
-        return hashlib.sha256(json.dumps(known, sort_keys=True, default=repr).encode()).hexdigest()
+    def described(self) -> Any:
+        """The server's description of itself, as plain data."""
+        return plain(self.server.about or {})
 
     def reset(self, observation: Observation, info: Mapping[str, Any], seed: int) -> None:
         """Start an episode: no actions are left, and the past holds nothing."""

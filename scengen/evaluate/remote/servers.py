@@ -5,6 +5,7 @@ Protocols as of openpi-client 0.1.2 (Physical-Intelligence/openpi, websocket_cli
 follows no redirect.
 """
 
+import json
 import socket
 import struct
 import time
@@ -16,6 +17,8 @@ from typing import Any
 
 from ...errors import ScengenError, cut
 from ...work.extras import module_of_extra
+from ...work.log import different
+from ...work.secrets import hidden
 from .client import Address, ClientSettings
 from .wire import MAX_MESSAGE, BadMessage, mapping, msgpack_numpy_array, openpi_array, unpacked
 
@@ -39,6 +42,7 @@ class Server(ABC):
         self.about: Mapping[str, Any] | None = None
         """Description that the server gave of itself; None before the first connection."""
         self._open = False
+        self._key, self._headers = client.secrets()
 
     def describe(self) -> Mapping[str, Any]:
         """The server's description of itself."""
@@ -78,8 +82,9 @@ class Server(ABC):
             return
         about = self._dial()
         self._open = True
-        if self.about is not None and about != self.about:
-            raise self.fault("after a lost connection, the server describes itself otherwise: it serves another policy")
+        if self.about is not None and (names := different(plain(self.about), plain(about))):
+            told = f"after a lost connection, the server describes itself otherwise ({cut(', '.join(names))})"
+            raise self.fault(f"{told}: it serves another policy")
         self.about = about
 
     def _repeated(self, work: Any, *arguments: Any) -> Any:
@@ -98,6 +103,8 @@ class Server(ABC):
 
     def fault(self, what: str) -> BadServer:
         """An error of this server, as one line."""
+        for value in (self._key, *self._headers.values()):
+            what = hidden(what, value)
         return BadServer(f"policy = {self.address}; {' '.join(what.split())}")
 
     def _reach(self) -> socket.socket:
@@ -131,6 +138,7 @@ class OpenPi(Server):
             EOFError,
         )
         self._opened = ExitStack()
+        self._key_header = {"Authorization": f"Api-Key {self._key}"} if self._key else {}  # as openpi-client has it
         self._socket: Any = None
 
     def infer(self, observation: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -150,7 +158,8 @@ class OpenPi(Server):
         try:
             # A given socket rules out proxies and redirects. Servers do not answer pings during an inference.
             dialled = self._websockets.connect(
-                f"ws://{self.address.location}",
+                str(self.address),
+                additional_headers=self._key_header | self._headers,
                 sock=plain,
                 compression=None,
                 proxy=None,
@@ -162,7 +171,8 @@ class OpenPi(Server):
             self._socket = self._opened.enter_context(dialled)
         except (*self._errors, ValueError) as error:
             plain.close()
-            raise Lost(f"the server refuses a websocket ({type(error).__name__}: {cut(str(error))})") from None
+            why = f"the server refuses a websocket ({type(error).__name__}: {cut(str(error))})"
+            raise Lost(f"{why} (does it need a key?)" if "HTTP 40" in why else why) from None
         return mapping(self._received(), "the metadata")
 
     def _exchange(self, request: bytes) -> Mapping[str, Any]:
@@ -207,13 +217,14 @@ class Gr00t(Server):
             self._socket = None
 
     def _dial(self) -> Mapping[str, Any]:
-        self._reach().close()
+        with self._reach() as reached:  # a name may have several addresses, of which ZeroMQ would take the first one
+            host, port, *_ = reached.getpeername()
         self._socket = self._context.socket(self._zmq.REQ)
         wait = max(1, round(1000 * self.client.timeout))
         for option, value in (("RCVTIMEO", wait), ("SNDTIMEO", wait), ("LINGER", 0), ("MAXMSGSIZE", MAX_MESSAGE)):
             self._socket.setsockopt(getattr(self._zmq, option), value)
         self._socket.setsockopt(self._zmq.IPV6, 1)
-        self._socket.connect(f"tcp://{self.address.location}")
+        self._socket.connect(f"tcp://{Address('zmq', host, port).location}")
         return mapping(self._call("get_modality_config"), "the modality configuration")
 
     def _action(self, data: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -223,7 +234,9 @@ class Gr00t(Server):
         return mapping(reply[0], "an action")
 
     def _call(self, endpoint: str, data: Mapping[str, Any] | None = None) -> Any:
-        request = {"endpoint": endpoint} if data is None else {"endpoint": endpoint, "data": data}
+        request: dict[str, Any] = {"endpoint": endpoint} if data is None else {"endpoint": endpoint, "data": data}
+        if self._key:
+            request["api_token"] = self._key
         try:
             self._socket.send(_packed(request, msgpack_numpy_array))
             message = self._socket.recv()
@@ -237,8 +250,14 @@ class Gr00t(Server):
         return reply
 
 
-SERVERS: dict[str, type[Server]] = {"ws": OpenPi, "zmq": Gr00t}
+SERVERS: dict[str, type[Server]] = {"ws": OpenPi, "wss": OpenPi, "zmq": Gr00t}
 """Kinds of connections, by the scheme of an address."""
+
+
+def plain(about: Mapping[str, Any]) -> Any:
+    """A server's description of itself as it can be compared and written."""
+    told = json.dumps({str(key): value for key, value in about.items()}, default=repr)
+    return json.loads(told, parse_constant=str)  # numbers that are none are words, which are equal to themselves
 
 
 def nested(observation: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
