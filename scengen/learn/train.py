@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from ..errors import BadConfig, UnknownName, cut
 from ..installation import versions
 from ..pictures.plots import svg_bytes
+from ..pool import kinds
 from ..pool.files import sha256
 from ..work.limits import at_least
 from ..work.targets import refused, try_folder, write
@@ -95,6 +96,7 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
         BadConfig: the folder holds another policy or another unfinished training, or cannot be written.
     """
     settings.check()
+    kinds.check_target(settings.to, kinds.POLICY)
     folder, identity = Path(settings.to), _identity(settings, data)
     learned, held_out = parted(data.trajectories)
     with _alone(folder):
