@@ -110,6 +110,8 @@ class DemonstrationManifest:
     """Code of the person who drove the robot; None if no person did."""
     policy: str | None = None
     """Name of the policy that drove the robot, as `scengen evaluate` takes it; None if no policy did."""
+    checks: Mapping[str, Any] | None = None
+    """Settings of the checks before the oracle plays; None for the usual ones of the task."""
 
     @classmethod
     def read(cls, folder: Path) -> "DemonstrationManifest":
