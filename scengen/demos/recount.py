@@ -1,4 +1,4 @@
-"""Counts of a folder of demonstrations, made again: attempts without a row are made anew, the others are in the files."""
+"""Counts of a folder of demonstrations, made again: attempts without a row are made anew."""
 
 import time
 from collections import Counter
