@@ -133,6 +133,35 @@ class Recording:
             case _:
                 raise PoolError(f"{self.folder}/meta/info.json has no size of the pictures; record it again")
 
+    @cached_property
+    def stats(self) -> dict[str, Any]:
+        """Content of `meta/stats.json`."""
+        return self._read_json("stats.json")
+
+    @cached_property
+    def tasks(self) -> dict[int, str]:
+        """Instructions by their number."""
+        rows = self._table(self.folder / "meta" / "tasks.parquet").to_pylist()
+        return {row.get("task_index"): row.get("task") for row in rows}
+
+    @cached_property
+    def _files(self) -> list[tuple[Path, int]]:
+        """Files of rows, and the number of rows up to the end of each."""
+        files, ends = sorted((self.folder / "data").glob("*/*.parquet")), 0
+        return [(file, ends := ends + self._table(file).num_rows) for file in files]
+
+    @property
+    def total(self) -> int:
+        """Number of rows of all files."""
+        return self._files[-1][1] if self._files else 0
+
+    def file_of(self, row: int) -> tuple[int, int] | None:
+        """Numbers of the chunk and of the file of a row; None if there is none."""
+        found = next((path for path, end in self._files if row < end), None)
+        parts = [] if found is None else [found.parent.name, found.stem]
+        numbers = [part.rpartition("-")[2] for part in parts]
+        return (int(numbers[0]), int(numbers[1])) if all(map(str.isdecimal, numbers)) and numbers else None
+
     def read(self) -> Iterator[EpisodeData]:
         """All episodes in their order.
 

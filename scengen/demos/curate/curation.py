@@ -35,6 +35,7 @@ from .remarks import with_remarks
 from .replays import Recorded, Replayed, comparison_of, lost, replayed
 from .score import KEPT_SCORE, scores_of, terms_of
 from .videos import FROZEN_CAMERA, Probe, Prober, check_video
+from .whole import Whole
 
 FOLDER = "curation"
 """Folder of the results, below that of the recording."""
@@ -110,6 +111,7 @@ def _examined(
     recording: Recording, settings: CurateSettings, search: Sequence[str], progress: Callable[[int], None]
 ) -> tuple[list[EpisodeReport], list[Recorded]]:
     """Reports with the scores of the measured terms, and what is to be replayed."""
+    whole = Whole(recording)
     reports, jobs, terms, tasks, solved = [], list[Recorded](), list[dict[str, float]](), list[str](), list[bool]()
     twins: dict[str, int] = {}
     size = recording.picture_size
@@ -120,6 +122,7 @@ def _examined(
         tasks.append(episode.task)
         solved.append(readable and bool(episode.about["scengen/success"]) and bool(episode.columns["next.success"][-1]))
         if readable:
+            findings += whole.of_episode(episode)
             films, told = _videos(episode, recording)
             frozen = {camera: one for camera, one in told if settings.replay and one.check == FROZEN_CAMERA}
             findings += [one for camera, one in told if frozen.get(camera) is not one]
@@ -135,6 +138,8 @@ def _examined(
                 jobs.append(
                     Recorded.of(episode.number, task, episode.about, episode.columns, entries, size, films, frozen)
                 )
+        else:
+            whole.skip(episode)
         about = episode.about
         style = str(about.get("scengen/style", ""))
         reports.append(
@@ -143,6 +148,8 @@ def _examined(
             )
         )
         progress(episode.number + 1)
+    shared = tuple(whole.of_all())
+    reports = [replace(report, findings=(*report.findings, *shared)) for report in reports]
     scores = _scores_of_readable(terms, tasks, solved)
     return [replace(report, score=score) for report, score in zip(reports, scores, strict=True)], jobs
 
