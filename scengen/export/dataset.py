@@ -4,6 +4,7 @@ A recording may be a stranger's: only plain files in its folder are opened, and 
 """
 
 import json
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from ..episode import STRICT, Rules, check_rules
 from ..errors import PoolError
 from ..pool.files import MAX_JSON
+from ..pool.kinds import check_one
 from ..pool.shards import check_groups
 from ..pool.untrusted import READING_MEMORY
 from ..work.machine import memory_bounded
@@ -27,6 +29,8 @@ from .lerobot import VIDEO_PATH
 
 TASK_VERSION = "scengen/task_version"
 """Column of the table of episodes with the version of the task. Recordings of earlier releases lack it."""
+CURATION = "curation"
+"""Folder of the results of a curation, below that of the recording."""
 MAX_FRAMES = 200_000
 """Largest number of rows of an episode that is read."""
 MAX_ROWS = 50_000_000
@@ -84,10 +88,19 @@ class Recording:
         found = cls(Path(folder))
         if not (found.folder / "meta" / "info.json").is_file():
             raise PoolError(f"no recording at {folder}: meta/info.json is missing; see scengen record")
+        check_one(folder)
+        found.check_places()
         lacking = [key for key in ("fps", "features", "total_episodes", "robot_type") if key not in found.info]
         if lacking or not found.well_formed or not found.episodes or "scengen/task" not in found.episodes[0]:
             raise PoolError(f"{folder} is not a recording of scengen; name a folder that scengen record has written")
         return found
+
+    def check_places(self) -> None:
+        """Raise `PoolError` unless the folders that are read and written hold plain files and folders, and no links."""
+        for folder in (self.folder / "meta", self.folder / CURATION):
+            for path in (folder, *(folder.iterdir() if folder.is_dir() and not folder.is_symlink() else ())):
+                if os.path.lexists(path) and (path.is_symlink() or not (path.is_dir() or path.is_file())):
+                    raise PoolError(f"{path} is a link, or no plain file; replace it, with cp -rL if there are links")
 
     @cached_property
     def info(self) -> dict[str, Any]:

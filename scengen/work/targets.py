@@ -103,7 +103,9 @@ def write(path: Path, content: str | bytes) -> None:
             return
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            part.write_bytes(data)
+            part.unlink(missing_ok=True)  # a link there would lead elsewhere
+            with open(part, "xb") as file:
+                file.write(data)
             os.replace(part, path)
         finally:
             part.unlink(missing_ok=True)
