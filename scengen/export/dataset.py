@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..episode import STRICT, Rules, check_rules
-from ..errors import PoolError
+from ..errors import BadConfig, PoolError, ScengenError
 from ..pool.files import MAX_JSON
 from ..pool.kinds import check_one
 from ..pool.shards import check_groups
@@ -26,6 +26,7 @@ from ..pool.untrusted import READING_MEMORY
 from ..work.machine import memory_bounded
 from ..work.plain import open_plain
 from .lerobot import VIDEO_PATH
+from .schema import check_episode, check_info
 
 TASK_VERSION = "scengen/task_version"
 """Column of the table of episodes with the version of the task. Recordings of earlier releases lack it."""
@@ -35,8 +36,6 @@ MAX_FRAMES = 200_000
 """Largest number of rows of an episode that is read."""
 MAX_ROWS = 50_000_000
 """Largest number of rows of a table that is read."""
-MAX_FPS = 1000
-"""Largest rate of rows [1/s]."""
 MAX_PIXELS = 4096 * 4096
 """Largest size of a picture that is decoded [pixels]."""
 
@@ -90,9 +89,15 @@ class Recording:
             raise PoolError(f"no recording at {folder}: meta/info.json is missing; see scengen record")
         check_one(folder)
         found.check_places()
-        lacking = [key for key in ("fps", "features", "total_episodes", "robot_type") if key not in found.info]
-        if lacking or not found.well_formed or not found.episodes or "scengen/task" not in found.episodes[0]:
-            raise PoolError(f"{folder} is not a recording of scengen; name a folder that scengen record has written")
+        try:
+            check_info(found.info)
+            if not found.episodes:
+                raise BadConfig("meta/episodes: there is no episode")
+            for number, row in enumerate(found.episodes):
+                check_episode(number, row, found.cameras)
+        except ScengenError as error:
+            remedy = "name a folder that scengen record has written"
+            raise PoolError(f"{folder} is not a recording of scengen: {error}; {remedy}") from None
         return found
 
     def check_places(self) -> None:
@@ -106,13 +111,6 @@ class Recording:
     def info(self) -> dict[str, Any]:
         """Content of `meta/info.json`."""
         return self._read_json("info.json")
-
-    @property
-    def well_formed(self) -> bool:
-        """Whether rate and features have their types."""
-        fps, features = self.info["fps"], self.info["features"]
-        rated = isinstance(fps, (int, float)) and 0 < fps <= MAX_FPS
-        return rated and isinstance(features, dict) and all(isinstance(each, dict) for each in features.values())
 
     @property
     def fps(self) -> float:
