@@ -150,6 +150,11 @@ class Recording:
         return self._read_json("stats.json")
 
     @cached_property
+    def source(self) -> dict[str, Any]:
+        """Content of `meta/scengen.json`: what was recorded."""
+        return self._read_json("scengen.json")
+
+    @cached_property
     def tasks(self) -> dict[int, str]:
         """Instructions by their number."""
         rows = self._table(self.folder / "meta" / "tasks.parquet").to_pylist()

@@ -67,6 +67,7 @@ class TrainSettings:
             raise BadConfig(
                 f"no scikit-learn for policy={self.policy}; say pip install 'scengen[train]', or policy=knn"
             )
+        kinds.check_target(self.to, kinds.POLICY)
         try_folder(self.to)
 
 
@@ -96,7 +97,6 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
         BadConfig: the folder holds another policy or another unfinished training, or cannot be written.
     """
     settings.check()
-    kinds.check_target(settings.to, kinds.POLICY)
     folder, identity = Path(settings.to), _identity(settings, data)
     learned, held_out = parted(data.trajectories)
     with _alone(folder):

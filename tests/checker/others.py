@@ -4,6 +4,7 @@ Each is made from an honest folder that is made once. `says` is a regular expres
 fault, the difference, or the line of what is only claimed. Nothing false is sound and unsaid.
 """
 
+import copy
 import json
 import shutil
 import tempfile
@@ -16,7 +17,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from forgery import Case
+from forgery import Case, Draft
+from make_base import BASE
 
 REFERENCE = Path(__file__).parents[2] / "generated" / "reference"
 HASH = "ab" * 32
@@ -69,10 +71,10 @@ def forge(change: Forge, folder: Path) -> None:
     change(plain, rows, failures)
     keep = plain["config"]["keep"]
     config = replace(found.manifest.config, keep=tuple(keep))
-    written = write_demonstrations(folder, replace(found.manifest, config=config), rows, failures)
+    write_demonstrations(folder, replace(found.manifest, config=config), rows, failures)
     entries = json.loads(path.read_text())
     files = {name: entries[name] for name in ("shards", "failed") if name in entries}
-    path.write_text(json.dumps({**plain, **files} if written else plain))
+    path.write_text(json.dumps({**plain, **files}))
 
 
 # --- demonstrations -------------------------------------------------------------------------------------------------
@@ -81,7 +83,7 @@ def forge(change: Forge, folder: Path) -> None:
 def counted(m: Manifest, rows: list[Any], failures: list[Any], indices: int | None = None) -> None:
     """Let the counts of a manifest follow from its rows, as a careful forger does."""
     kept, lost = len(rows), len(failures)
-    m["n"], m["indices"] = min(m["n"], kept), indices or (rows[-1].index * m["config"]["runs"] + rows[-1].run + 1)
+    m["indices"] = indices or (rows[-1].index * m["config"]["runs"] + rows[-1].run + 1)
     m["styles"] = {style: sum(row.style == style for row in rows) for style in {row.style for row in rows}}
     reasons = [f"solved: {row.outcome}: {row.reason}" for row in failures]
     from scengen.pool.manifest import without_numbers
@@ -183,10 +185,10 @@ def twice_failed(m: Manifest, rows: list[Any], failures: list[Any]) -> None:
 
 
 DEMONSTRATIONS: dict[str, tuple[str, Forge, str]] = {
-    "removed": ("demonstrations", without(1), "made again, attempts without a row fail for other reasons"),
-    "removed at the end": ("demonstrations", without(-1), "made again|attempts|run ends"),
+    "removed": ("demonstrations", without(1), "rows and reasons give 3 attempts, not 4"),
+    "removed at the end": ("demonstrations", without(-1), "4 demonstrations were asked for, and the run ended with 3"),
     "counted as failed": ("demonstrations", hidden, "made again, attempts without a row fail for other reasons"),
-    "second runs removed": ("demonstrations", first_runs, "made again, attempts without a row fail for other reasons"),
+    "second runs removed": ("demonstrations", first_runs, "rows and reasons give 2 attempts, not 3"),
     "shortest kept": ("demonstrations", shortest, "made again|rows and reasons give"),
     "runs halved": ("demonstrations", config(runs=1), "none of the|rows and reasons|occurs twice"),
     "attempts times 10000": ("demonstrations", times(10_000), "run ends with its last attempt|rows and reasons give"),
@@ -230,8 +232,9 @@ def column(path: str, name: str, change: Callable[[np.ndarray], Any], folder: Pa
     new = change(np.array(values[:length]))
     values[:length] = new if isinstance(new, list) else new.tolist()
     place = table.schema.get_field_index(name)
-    array = pa.array(values, table.schema.field(name).type)
-    pq.write_table(table.set_column(place, table.schema.field(place), array), folder / path)
+    kind = table.schema.field(name).type
+    array = pa.array(values) if pa.types.is_list(kind) and path == EPISODES else pa.array(values, kind)
+    pq.write_table(table.set_column(place, name, array), folder / path)
 
 
 def told(name: str, value: Any) -> Callable[[Path], None]:
@@ -314,14 +317,11 @@ RECORDINGS: dict[str, tuple[Callable[[Path], None], str]] = {
 
 def false_pool(folder: Path) -> None:
     """Put a pool with weaker gravity beside what is there."""
-    from scengen.pool.manifest import Manifest as PoolManifest
-
-    shutil.copytree(REFERENCE, folder, dirs_exist_ok=True)
-    path = folder / "manifest.json"
-    plain = json.loads(path.read_text())
-    assert PoolManifest.read(REFERENCE)
-    plain["n"] = 10**6
-    path.write_text(json.dumps(plain))
+    draft = copy.deepcopy(Draft.of(BASE / "single_quick"))
+    draft.scene("<option ", '<option gravity="0 0 -1" ', rows=len(draft.rows))
+    with tempfile.TemporaryDirectory() as scratch:
+        draft.write(Path(scratch, "pool"))
+        shutil.copytree(Path(scratch, "pool"), folder, dirs_exist_ok=True)
 
 
 def _beside(folder: Path) -> None:
@@ -349,7 +349,7 @@ def _in_recording(folder: Path) -> None:
 
 MIXED: dict[str, tuple[Callable[[Path], None], str]] = {
     "pool beside demonstrations": (_beside, "a folder must be one of them"),
-    "pool above demonstrations": (_below, "asked for|author's word|n ="),
+    "pool above demonstrations": (_below, "REFUTED .*scene"),
     "pools and demonstrations in a folder": (_siblings, "name the folders"),
     "pool in a recording": (_in_recording, "a folder must be one of them"),
 }

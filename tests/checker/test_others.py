@@ -47,7 +47,8 @@ def test_a_folder_that_is_two_things_is_not_sound(name, tmp_path, capsys):
     folder = tmp_path / "mixed"
     folder.mkdir()
     change(folder)
-    status, text = said(capsys, "verify" if not (folder / "meta").exists() else "curate", f"pool={folder}")
+    words = ["curate", f"data={folder}"] if (folder / "meta").exists() else ["verify", f"pool={folder}"]
+    status, text = said(capsys, *words)
     assert status and re.search(says, text, re.S), text
 
 
@@ -64,6 +65,13 @@ def test_every_command_refuses_a_pool_beside_demonstrations(tmp_path, capsys):
         given = f"{'data' if words[0] == 'train' else 'pool'}={folder}"
         status, text = said(capsys, *words, given)
         assert status == 2 and "a folder must be one of them" in text, text
+
+
+def test_a_recording_of_other_demonstrations_is_not_learned_from(tmp_path, capsys):
+    honest("recording", tmp_path / "policy" / "recording")
+    demos = honest("demonstrations", tmp_path / "demos")
+    status, text = said(capsys, "train", f"data={demos}", f"to={tmp_path / 'policy'}")
+    assert status == 2 and "was recorded from other demonstrations" in text
 
 
 @pytest.mark.parametrize("verb", ["demos", "evaluate", "train", "subset", "generate"])
