@@ -6,10 +6,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..certificate import Check
+from ..compose import certify_levels
 from ..errors import BadConfig, Infeasible, cut
 from ..ood.analysis.distance import NEAR_DUPLICATE_DISTANCE, near_duplicates
 from ..ood.analysis.space import Batch
@@ -237,9 +239,17 @@ def generate_demonstrations(
         limits = Limits(settings.limit_seconds, settings.limit_mb)
         extend(job, Wanted(KEPT, settings.n, limit, settings.workers, limits), records, journal, progress)
         with reported_write_errors(folder):
-            return finish(folder, task, config, settings.n, records, journal)
+            checks = own_checks(task, certify_settings)
+            return finish(folder, task, config, settings.n, records, journal, checks=checks)
     finally:
         journal.close()
+
+
+def own_checks(task: Task, settings: CertifySettings) -> dict[str, Any] | None:
+    """Settings of the checks before the oracle plays; None if they are the usual ones of the task."""
+    own, usual = asdict(settings), asdict(certify_levels(task)["quick"])
+    found = {name: own[name] for name in ("overlap", "rest")}
+    return found if any(usual[name] != value for name, value in found.items()) else None
 
 
 def finish(
@@ -251,41 +261,59 @@ def finish(
     journal: Journal,
     operator: str | None = None,
     policy: str | None = None,
+    checks: Mapping[str, Any] | None = None,
 ) -> DemosSummary:
     """Write the first n demonstrations, and count the attempts up to the last of them.
 
     Args:
         operator: code of the person who drove the robot; None if no person did.
         policy: name of the policy that drove the robot; None if no policy did.
+        checks: settings of the checks before the oracle plays, if they differ from the usual ones.
     """
     kept = first_of(records, KEPT, n)
     counted = [records[i] for i in sorted(records) if len(kept) < n or i <= kept[-1]]
     lost = [r.index for r in counted if r.check == "solved" and r.reason != GIVEN_UP]
     failed = lost if config.keep else []
-    outcomes = Counter("success" if r.verdict == KEPT else r.reason.partition(":")[0] for r in counted if _played(r))
+    reasons = Counter(rejection(r) for r in counted if r.check)
     manifest = DemonstrationManifest(
         config=config,
         n=n,
         indices=counted[-1].index + 1 if counted else 0,
-        funnel=funnel(counted),
-        reasons=dict(Counter(rejection(r) for r in counted if r.check)),
-        outcomes=dict(outcomes),
+        funnel=funnel(Counter(r.check for r in counted if r.check), len(kept)),
+        reasons=dict(reasons),
+        outcomes=outcomes(reasons, len(kept)),
         styles=dict(Counter(row.style for row in journal.rows(kept))),
         operator=operator,
         policy=policy,
+        checks=checks,
         **made_with(task),
     )
     written = write_demonstrations(folder, manifest, journal.rows(kept), journal.rows(failed))
     return DemosSummary(written, len(kept), written.manifest, math.fsum(r.cpu for r in counted))
 
 
-def _played(record: Record) -> bool:
-    """Whether the oracle has played an attempt to its end."""
-    return record.check in ("", "solved")
+def outcomes(reasons: Mapping[str, int], kept: int) -> dict[str, int]:
+    """Number of rollouts by outcome.
+
+    Args:
+        reasons: number of failed attempts by "check: reason".
+        kept: number of demonstrations.
+    """
+    found = Counter({"success": kept} if kept else {})
+    for key, times in reasons.items():
+        if key.startswith("solved: "):
+            found[key.split(": ")[1]] += times
+    return dict(found)
 
 
-def funnel(records: Sequence[Record]) -> dict[str, int]:
-    """Number of attempts, and of those that got through each step."""
-    order = [*STEPS, ""]
-    reached = [order.index("compiles" if r.check == PROCESS else r.check) for r in records]
-    return {"attempted": len(records), **{name: sum(p > k for p in reached) for k, name in enumerate(STEPS)}}
+def funnel(lost: Mapping[str, int], kept: int) -> dict[str, int]:
+    """Number of attempts, and of those that got through each step.
+
+    Args:
+        lost: number of failed attempts by the check that failed.
+        kept: number of demonstrations.
+    """
+    at = Counter({name: lost.get(name, 0) for name in STEPS})
+    at["compiles"] += lost.get(PROCESS, 0)
+    left = [kept + sum(at[name] for name in STEPS[place:]) for place in range(len(STEPS) + 1)]
+    return dict(zip(("attempted", *STEPS), left, strict=True))

@@ -1,17 +1,27 @@
 """Verification of demonstrations of unknown origin: drawn again, scenes built again, replayed bit for bit."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from ..certificate import as_json
-from ..episode import check_rules
+from ..episode import STRICT, check_rules
 from ..errors import Infeasible, PoolError, ScengenError
 from ..params import canonical
-from ..pool.demonstrations import DEMONSTRATIONS, POLICY, SCRIPTED, TELEOP, DemonstrationConfig, Demonstrations
+from ..pool import Pool
+from ..pool.demonstrations import (
+    DEMONSTRATIONS,
+    POLICY,
+    SCRIPTED,
+    TELEOP,
+    DemonstrationConfig,
+    DemonstrationManifest,
+    Demonstrations,
+)
 from ..pool.files import sha256
+from ..pool.manifest import PROCESS
 from ..pool.row import DemonstrationRow
 from ..samplers.split import Split
 from ..samplers.task import Task
@@ -21,11 +31,15 @@ from ..validate.identity import check_versions
 from ..validate.labels import labels_of_draw, labels_of_task
 from ..validate.rebuilt import difference, rebuild
 from ..validate.rollout import replay, run
+from ..validate.settings import CertifySettings
 from ..validate.verify.claims import OfCode, comparable, passed_filter
 from ..validate.verify.examine import Verdict
+from ..validate.verify.findings import task_differences, wrong_names
 from ..validate.verify.stored import task_of_manifest
 from ..work.fingerprint import fingerprint
 from ..work.parallel import Limits, Workers, each
+from .generate import Job, Others
+from .recount import Recount, checks_of
 from .styles import check_styles, chosen, in_style
 
 
@@ -52,6 +66,10 @@ class DemosReport:
     declined: list[str] = field(default_factory=list)
     """Reasons why something could not be judged."""
     remarks: list[str] = field(default_factory=list)
+    claimed: list[str] = field(default_factory=list)
+    """Claims that were not checked: they are the author's word."""
+    differences: list[dict[str, str]] = field(default_factory=list)
+    """Differences between the manifest's task and the installed one: `key`, `pool` and `installed`."""
     checked: int = 0
     """Number of demonstrations and failed attempts that were looked at."""
     exact: int = 0
@@ -77,6 +95,8 @@ class Judge:
     """Whether the oracle plays again, too."""
     other_version: str = ""
     """Versions in words if the demonstrations were made on another one, see `Task.other_version`."""
+    others: Others = field(default_factory=partial(Others.of, ()))
+    """Scenarios of the pools from which these were kept apart."""
 
     def __call__(self, row: DemonstrationRow) -> Examined:
         try:
@@ -132,6 +152,8 @@ class Judge:
         except Infeasible:
             yield OfCode(f"drawn again, index {row.index} gives no feasible scenario")
             return
+        if reason := self.others.too_near(self.task, draw):
+            yield f"not kept apart: {reason}"
         for name, there in labels_of_draw(draw).items():
             if comparable(getattr(row, name)) != comparable(there):
                 yield OfCode(f"the {name} is not that of the scenario that is drawn for index {row.index}")
@@ -145,6 +167,8 @@ class Judge:
         faults, exact = [], again.digest == row.final_state
         if again.outcome != row.outcome:
             faults.append(f"replayed, the outcome is {again.outcome} ({again.reason}), not {row.outcome}")
+        if self.same_machine and again.outcome == row.outcome and again.reason != row.reason:
+            faults.append(f"the reason is {row.reason[:200]!a}, replayed it is {again.reason[:200]!a}")
         if self.same_machine and not exact:
             faults.append("the replay ends in other bits")
         if self.same_machine and again.seconds != row.seconds:
@@ -172,6 +196,7 @@ def verify_demonstrations(
     limits: Limits,
     oracle: bool = False,
     progress: Callable[[int], None] = lambda done: None,
+    apart: Sequence[Pool] = (),
 ) -> DemosReport:
     """Check every claim of a folder of demonstrations, failed attempts included.
 
@@ -179,6 +204,7 @@ def verify_demonstrations(
         installed: the task of that name on this machine.
         oracle: whether the oracle plays every demonstration again, too.
         progress: called with the number of rows that have been checked.
+        apart: pools from which the scenarios were kept apart by the manifest, as far as they are here.
     """
     report, manifest = DemosReport(str(found.folder)), found.manifest
     report.faults += [f"{name} {what}" for name, what in found.damaged().items()]
@@ -193,64 +219,145 @@ def verify_demonstrations(
             check_styles(manifest.config.styles)
         task = task_of_manifest(found, installed)
         task.shifts(manifest.config.split)
+        settings = checks_of(task, manifest)
     except ScengenError as error:
         other = installed.other_version("made on", manifest.task_version)
         (report.declined if other else report.faults).append(f"{DEMONSTRATIONS}: {error}")
         return report
-    if other := task.other_version("made on", manifest.task_version):
-        report.remarks.append(f"{other}: what differs between the versions cannot be checked here")
-    same = manifest.fingerprint == fingerprint()
-    if not same:
-        report.remarks.append("made on a machine with different rounding: final states are not compared")
-    if oracle and manifest.source != SCRIPTED:
-        report.remarks.append(f"source {manifest.source}: there is no oracle to play them again")
-    judge = Judge(task, manifest.config, manifest.indices, same, oracle and manifest.source == SCRIPTED, other)
-    order = _Order(manifest.config.runs)
-
-    def rows() -> Iterator[DemonstrationRow]:
-        for row in found.rows():
-            order.add(row)
-            yield row
-        yield from found.failures()
-
-    try:
-        for one in each(judge, rows(), workers, limits, _lost):
-            report.checked += 1
-            report.exact += one.exact
-            report.faults += [f"{one.name}: {fault}" for fault in one.faults]
-            if one.declined:
-                report.declined.append(f"{one.name}: {one.declined}")
-            progress(min(report.checked, len(found)))
-    except PoolError as error:
-        report.faults.append(str(error))
-    report.faults += order.faults(found)
+    _Verification(found, task, settings, apart, report).verify(installed, workers, limits, oracle, progress)
     return report
 
 
 @dataclass
-class _Order:
-    """Order and outcomes of the demonstrations, compared with the manifest."""
+class _Verification:
+    """Verification of a folder whose manifest can be read."""
 
-    runs: int
-    last: int = -1
-    wrong: list[str] = field(default_factory=list)
-    styles: dict[str, int] = field(default_factory=dict)
+    found: Demonstrations
+    task: Task
+    """The task as the manifest describes it."""
+    settings: CertifySettings
+    """Settings of the checks before the oracle plays."""
+    pools: Sequence[Pool]
+    """The pools that are here of those from which the scenarios were kept apart."""
+    report: DemosReport
 
-    def add(self, row: DemonstrationRow) -> None:
-        """Note a demonstration that is looked at."""
-        number = row.index * self.runs + row.run
-        if number <= self.last:
-            self.wrong.append(f"{_name(row)} occurs twice, or after a later one")
-        if row.outcome != "success":
-            self.wrong.append(f"{_name(row)} is a failed attempt among the demonstrations")
-        self.last = number
-        self.styles[row.style] = self.styles.get(row.style, 0) + 1
+    @cached_property
+    def other(self) -> str:
+        """Versions in words if the demonstrations were made on another one, see `Task.other_version`."""
+        return self.task.other_version("made on", self.found.manifest.task_version)
 
-    def faults(self, found: Demonstrations) -> list[str]:
-        """Faults of the order, and counts that differ from those of the manifest."""
-        manifest = found.manifest
-        if self.styles != dict(manifest.styles):
-            self.wrong.append(f"{DEMONSTRATIONS} counts other styles than there are")
-        if manifest.outcomes.get("success", 0) != sum(self.styles.values()):
-            self.wrong.append(f"{DEMONSTRATIONS} counts a different number of successes than there are")
-        return self.wrong
+    @cached_property
+    def same_machine(self) -> bool:
+        """Whether the rounding of this machine is that of the author's."""
+        return self.found.manifest.fingerprint == fingerprint()
+
+    @cached_property
+    def others(self) -> Others:
+        """Scenarios of the pools."""
+        return Others.of(self.pools)
+
+    @property
+    def unknown(self) -> set[str]:
+        """Hashes of the pools that are not here of those from which the scenarios were kept apart."""
+        return {*self.found.manifest.config.apart}.difference(pool.sha256 for pool in self.pools)
+
+    def verify(
+        self, installed: Task, workers: Workers, limits: Limits, oracle: bool, progress: Callable[[int], None]
+    ) -> None:
+        """Compare tasks, rows and counts, in this order."""
+        self._compare_task(installed, oracle)
+        recount = Recount(self.found.manifest)
+        if self._rows(recount, workers, limits, oracle, progress):
+            self._counts(recount, workers, limits)
+        self._claims(recount, oracle)
+        if not (self.report.checked or recount.again):
+            self.report.declined.append("it holds no rollout, and none could be made again: there is nothing to judge")
+
+    def _compare_task(self, installed: Task, oracle: bool) -> None:
+        report, manifest = self.report, self.found.manifest
+        report.differences = task_differences(installed, self.task)
+        if manifest.config.rules != STRICT:
+            told = {"key": "rules", "pool": manifest.config.rules, "installed": STRICT}
+            report.differences.append(told)
+        report.faults += wrong_names(installed, self.task)
+        if self.other:
+            report.remarks.append(f"{self.other}: what differs between the versions cannot be checked here")
+        if not self.same_machine:
+            report.remarks.append("made on a machine with different rounding: final states are not compared")
+        if oracle and manifest.source != SCRIPTED:
+            report.remarks.append(f"source {manifest.source}: there is no oracle to play them again")
+
+    def _rows(
+        self, recount: Recount, workers: Workers, limits: Limits, oracle: bool, progress: Callable[[int], None]
+    ) -> bool:
+        """Examine all rows. Returns whether they could be read."""
+        report, manifest = self.report, self.found.manifest
+        scripted = manifest.source == SCRIPTED
+        of = (self.task, manifest.config, manifest.indices, self.same_machine, oracle and scripted)
+        judge = Judge(*of, self.other, self.others)
+
+        def rows() -> Iterator[DemonstrationRow]:
+            for stored, count in ((self.found.rows(), recount.keep), (self.found.failures(), recount.lose)):
+                for row in stored:
+                    report.faults += [f"{_name(row)} {what}" for what in count(row)]
+                    yield row
+
+        try:
+            for one in each(judge, rows(), workers, limits, _lost):
+                report.checked += 1
+                report.exact += one.exact
+                report.faults += [f"{one.name}: {fault}" for fault in one.faults]
+                if one.declined:
+                    report.declined.append(f"{one.name}: {one.declined}")
+                progress(min(report.checked, len(self.found)))
+        except PoolError as error:
+            report.faults.append(str(error))
+            return False
+        return True
+
+    def _counts(self, recount: Recount, workers: Workers, limits: Limits) -> None:
+        """Compare the counts of the manifest with the rows, and with the attempts without a row, made again."""
+        report, manifest = self.report, self.found.manifest
+        report.faults += [f"{DEMONSTRATIONS}: {what}" for what in recount.contradictions()]
+        if manifest.source != SCRIPTED:
+            report.faults += [f"{DEMONSTRATIONS}: {what}" for what in recount.without_row()]
+        elif not report.faults:
+            job = Job(self.task, manifest.config, self.settings, self.others)
+            if why := recount.too_many() or recount.make_again(job, workers, limits):
+                report.declined.append(why)
+            else:
+                self._losses(recount)
+
+    def _losses(self, recount: Recount) -> None:
+        """Compare the reasons with those of the attempts that were made again, if they can be compared."""
+        wrong = list(recount.losses(not self.unknown))
+        if self.other:
+            self.report.declined += [f"{self.other}, where {what}" for what in wrong]
+        elif self.same_machine:
+            self.report.faults += [f"{DEMONSTRATIONS}: {what}" for what in wrong]
+        elif wrong:
+            self.report.claimed.append(f"why {recount.again.total()} attempts without a row failed, on that machine")
+
+    def _claims(self, recount: Recount, oracle: bool) -> None:
+        """Collect what is the author's word."""
+        manifest, claimed = self.found.manifest, self.report.claimed
+        claimed += recount.claimed
+        if self.unknown:
+            these = ", ".join(sorted(each[:12] for each in self.unknown))
+            claimed.append(f"apart from {len(self.unknown)} pools that are not here ({these}); apart=FOLDER checks it")
+        if lost := sum(times for key, times in manifest.reasons.items() if key.partition(": ")[0] == PROCESS):
+            claimed.append(f"{lost} attempts were lost to limits or crashes")
+        if manifest.checks is not None:
+            claimed.append("own settings of the checks before the oracle plays")
+        if manifest.source != POLICY and len(recount.kept) < manifest.n:
+            claimed.append(f"{manifest.n} demonstrations were asked for, and the run ended with {len(recount.kept)}")
+        claimed += _author(manifest, oracle)
+
+
+def _author(manifest: DemonstrationManifest, oracle: bool) -> list[str]:
+    """Claims about whoever drove the robot."""
+    if manifest.source == POLICY:
+        return [f"policy {manifest.policy!a} drove the robot", "no rollout of it was left out"]
+    if manifest.source == TELEOP:
+        return [f"operator {manifest.operator} drove the robot", "no take was left out"]
+    return [] if oracle else ["the oracle played the actions (level=full plays it again)"]

@@ -14,7 +14,7 @@ from typing import Any
 from ..compose import load_task
 from ..episode import Actions
 from ..errors import BadConfig, PoolError
-from ..pool import Pool
+from ..pool import Pool, kinds
 from ..samplers.split import ID
 from ..samplers.task_files import about as about_task
 from ..validate.playable import unplayable
@@ -62,11 +62,12 @@ def evaluate(
     """
     settings = completed(settings)
     settings.check()
+    kinds.check_target(settings.folder, kinds.EPISODES)
     try_folder(settings.folder)
     pools = [Pool.open(folder).check() for folder in settings.folders]
     about, lost = _scenarios(pools, settings, search)
     wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
-    path = settings.folder / "episodes.jsonl"
+    path = settings.folder / kinds.EPISODES
     if settings.remote and settings.version is None and not settings.fresh and path.exists():
         why = f"{path} holds episodes of an earlier run, and a server does not say which weights it serves"
         raise BadConfig(f"{why}; pass fresh=true to start again, or version=NAME from the start to be able to continue")

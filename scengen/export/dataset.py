@@ -4,6 +4,7 @@ A recording may be a stranger's: only plain files in its folder are opened, and 
 """
 
 import json
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,22 +18,24 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..episode import STRICT, Rules, check_rules
-from ..errors import PoolError
+from ..errors import BadConfig, PoolError, ScengenError
 from ..pool.files import MAX_JSON
+from ..pool.kinds import check_one
 from ..pool.shards import check_groups
 from ..pool.untrusted import READING_MEMORY
 from ..work.machine import memory_bounded
 from ..work.plain import open_plain
 from .lerobot import VIDEO_PATH
+from .schema import check_episode, check_info
 
 TASK_VERSION = "scengen/task_version"
 """Column of the table of episodes with the version of the task. Recordings of earlier releases lack it."""
+CURATION = "curation"
+"""Folder of the results of a curation, below that of the recording."""
 MAX_FRAMES = 200_000
 """Largest number of rows of an episode that is read."""
 MAX_ROWS = 50_000_000
 """Largest number of rows of a table that is read."""
-MAX_FPS = 1000
-"""Largest rate of rows [1/s]."""
 MAX_PIXELS = 4096 * 4096
 """Largest size of a picture that is decoded [pixels]."""
 
@@ -84,22 +87,30 @@ class Recording:
         found = cls(Path(folder))
         if not (found.folder / "meta" / "info.json").is_file():
             raise PoolError(f"no recording at {folder}: meta/info.json is missing; see scengen record")
-        lacking = [key for key in ("fps", "features", "total_episodes", "robot_type") if key not in found.info]
-        if lacking or not found.well_formed or not found.episodes or "scengen/task" not in found.episodes[0]:
-            raise PoolError(f"{folder} is not a recording of scengen; name a folder that scengen record has written")
+        check_one(folder)
+        found.check_places()
+        try:
+            check_info(found.info)
+            if not found.episodes:
+                raise BadConfig("meta/episodes: there is no episode")
+            for number, row in enumerate(found.episodes):
+                check_episode(number, row, found.cameras)
+        except ScengenError as error:
+            remedy = "name a folder that scengen record has written"
+            raise PoolError(f"{folder} is not a recording of scengen: {error}; {remedy}") from None
         return found
+
+    def check_places(self) -> None:
+        """Raise `PoolError` unless the folders that are read and written hold plain files and folders, and no links."""
+        for folder in (self.folder / "meta", self.folder / CURATION):
+            for path in (folder, *(folder.iterdir() if folder.is_dir() and not folder.is_symlink() else ())):
+                if os.path.lexists(path) and (path.is_symlink() or not (path.is_dir() or path.is_file())):
+                    raise PoolError(f"{path} is a link, or no plain file; replace it, with cp -rL if there are links")
 
     @cached_property
     def info(self) -> dict[str, Any]:
         """Content of `meta/info.json`."""
         return self._read_json("info.json")
-
-    @property
-    def well_formed(self) -> bool:
-        """Whether rate and features have their types."""
-        fps, features = self.info["fps"], self.info["features"]
-        rated = isinstance(fps, (int, float)) and 0 < fps <= MAX_FPS
-        return rated and isinstance(features, dict) and all(isinstance(each, dict) for each in features.values())
 
     @property
     def fps(self) -> float:
@@ -132,6 +143,40 @@ class Recording:
                 return width, height
             case _:
                 raise PoolError(f"{self.folder}/meta/info.json has no size of the pictures; record it again")
+
+    @cached_property
+    def stats(self) -> dict[str, Any]:
+        """Content of `meta/stats.json`."""
+        return self._read_json("stats.json")
+
+    @cached_property
+    def source(self) -> dict[str, Any]:
+        """Content of `meta/scengen.json`: what was recorded."""
+        return self._read_json("scengen.json")
+
+    @cached_property
+    def tasks(self) -> dict[int, str]:
+        """Instructions by their number."""
+        rows = self._table(self.folder / "meta" / "tasks.parquet").to_pylist()
+        return {row.get("task_index"): row.get("task") for row in rows}
+
+    @cached_property
+    def _files(self) -> list[tuple[Path, int]]:
+        """Files of rows, and the number of rows up to the end of each."""
+        files, ends = sorted((self.folder / "data").glob("*/*.parquet")), 0
+        return [(file, ends := ends + self._table(file).num_rows) for file in files]
+
+    @property
+    def total(self) -> int:
+        """Number of rows of all files."""
+        return self._files[-1][1] if self._files else 0
+
+    def file_of(self, row: int) -> tuple[int, int] | None:
+        """Numbers of the chunk and of the file of a row; None if there is none."""
+        found = next((path for path, end in self._files if row < end), None)
+        parts = [] if found is None else [found.parent.name, found.stem]
+        numbers = [part.rpartition("-")[2] for part in parts]
+        return (int(numbers[0]), int(numbers[1])) if all(map(str.isdecimal, numbers)) and numbers else None
 
     def read(self) -> Iterator[EpisodeData]:
         """All episodes in their order.

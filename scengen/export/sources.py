@@ -62,15 +62,16 @@ def number_of(source: Source, failed: bool) -> int:
 
 
 def origins_of(pools: Sequence[Source], count: int, failed: bool = False) -> Iterator[dict[str, str]]:
-    """Source, operator and rules of each of the first rows, for demonstrations; nothing for pools."""
+    """Design of the draws of each of the first rows; for demonstrations also source, operator and rules."""
     return islice(chain.from_iterable(repeat(_origin(s), number_of(s, failed)) for s in pools), count)
 
 
 def _origin(source: Source) -> dict[str, str]:
+    sampler = source.manifest.config.sampler
     if isinstance(source, Pool):
-        return {}
+        return {"sampler": sampler}
     about = source.manifest
-    return {"source": about.source, "operator": about.operator or "", "rules": about.config.rules}
+    return {"sampler": sampler, "source": about.source, "operator": about.operator or "", "rules": about.config.rules}
 
 
 def texts_of(source: Source, name: str, failed: bool) -> set[str]:

@@ -1,6 +1,7 @@
 """Demonstrations for training: the observations and actions of each episode of a recording, at its own rate."""
 
 import json
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
@@ -13,12 +14,12 @@ from ..control.loop import ACTION, Loop
 from ..envs.object_state import NAME
 from ..envs.observations import proprioception
 from ..errors import BadConfig, PoolError, UnknownName, cut
-from ..export.dataset import TASK_VERSION, EpisodeData, Recording
+from ..export.dataset import CURATION, TASK_VERSION, EpisodeData, Recording
 from ..export.streams import ENVIRONMENT
 from ..pool.files import read_json_file, sha256, sha256_of_file
 from .goals import pose_streams
 
-KEPT = Path("curation", "kept.json")
+KEPT = Path(CURATION, "kept.json")
 """File in which `scengen curate` lists the episodes that are kept."""
 MIN_EPISODES = 2
 """Smallest number of demonstrations: one to learn from, one held out."""
@@ -190,12 +191,14 @@ def _values(episode: EpisodeData, columns: Iterable[str]) -> NDArray[np.float32]
 def _kept(recording: Recording) -> set[int] | None:
     """Numbers of the episodes that a curation has kept; None without one."""
     path = recording.folder / KEPT
-    if not path.is_file():
+    if not os.path.lexists(path):
         return None
     try:
         found = read_json_file(path)
         if not (isinstance(found, list) and all(type(number) is int for number in found)):
             raise ValueError("not a list of numbers")
+        if strange := [number for number in found if not 0 <= number < len(recording.episodes)]:
+            raise ValueError(f"there is no episode {strange[0]}")
     except (ValueError, OSError) as error:
         raise PoolError(f"{path} is damaged ({cut(str(error))}); repeat scengen curate, or remove it") from None
     return set(found)

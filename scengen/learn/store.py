@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..control.loop import Loop
 from ..errors import BadConfig, PoolError, ScengenError, UnknownName, cut
+from ..pool import kinds
 from ..pool.files import read_json_file, sha256
 from ..pool.untrusted import HASH, WORD, check_match, check_text, check_versions, check_whole, demand
 from ..sim.embodiment import EMBODIMENTS, action_size
@@ -30,7 +31,7 @@ from .features import Features, number_names
 from .goals import pose_streams
 from .models import KINDS, KNN, MIP
 
-SETTINGS = "policy.json"
+SETTINGS = kinds.POLICY
 """File with everything about a policy except its arrays."""
 WEIGHTS = "weights.npz"
 """File with the arrays of a policy."""

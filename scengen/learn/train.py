@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from ..errors import BadConfig, UnknownName, cut
 from ..installation import versions
 from ..pictures.plots import svg_bytes
+from ..pool import kinds
 from ..pool.files import sha256
 from ..work.limits import at_least
 from ..work.targets import refused, try_folder, write
@@ -66,6 +67,7 @@ class TrainSettings:
             raise BadConfig(
                 f"no scikit-learn for policy={self.policy}; say pip install 'scengen[train]', or policy=knn"
             )
+        kinds.check_target(self.to, kinds.POLICY)
         try_folder(self.to)
 
 

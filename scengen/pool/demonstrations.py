@@ -13,6 +13,7 @@ from ..errors import PoolError, ScengenError
 from ..work.typed import typed
 from . import writing
 from .files import read_json_file, replace_file
+from .kinds import MARKS, check_one, marks
 from .manifest import (
     MAX_INDICES,
     MAX_SHARDS,
@@ -109,6 +110,8 @@ class DemonstrationManifest:
     """Code of the person who drove the robot; None if no person did."""
     policy: str | None = None
     """Name of the policy that drove the robot, as `scengen evaluate` takes it; None if no policy did."""
+    checks: Mapping[str, Any] | None = None
+    """Settings of the checks before the oracle plays; None for the usual ones of the task."""
 
     @classmethod
     def read(cls, folder: Path) -> "DemonstrationManifest":
@@ -117,6 +120,7 @@ class DemonstrationManifest:
         Raises:
             PoolError: it does not exist, it is damaged, or it is of another format.
         """
+        check_one(folder)
         path = folder / DEMONSTRATIONS
         if not path.is_file():
             begun = Path(f"{folder}.run").is_dir()
@@ -244,14 +248,29 @@ def write_demonstrations(
 
 
 def is_demonstrations(folder: str | Path) -> bool:
-    """Whether a folder holds demonstrations."""
+    """Whether a folder holds demonstrations.
+
+    Raises:
+        PoolError: it holds something else besides.
+    """
+    check_one(folder)
     return (Path(folder) / DEMONSTRATIONS).is_file()
 
 
 def demonstration_folders(given: str | Sequence[str]) -> list[str]:
-    """Folders of demonstrations. A folder without a manifest stands for those in it, as `task=all` writes them."""
-    found: list[str] = []
-    for folder in [given] if isinstance(given, str) else given:
-        inside = [] if is_demonstrations(folder) else sorted(Path(folder).glob(f"*/{DEMONSTRATIONS}"))
-        found += [str(path.parent) for path in inside] or [folder]
-    return found
+    """Folders of demonstrations. A folder without a manifest stands for those in it, as `task=all` writes them.
+
+    Raises:
+        PoolError: a folder holds something besides demonstrations.
+    """
+    return [each for folder in ([given] if isinstance(given, str) else given) for each in _members(folder)]
+
+
+def _members(folder: str) -> list[str]:
+    check_one(folder)
+    inside = {} if marks(folder) else {path: marks(path) for path in sorted(Path(folder).glob("*/"))}
+    found = [str(path) for path, own in inside.items() if DEMONSTRATIONS in own]
+    if found and (others := {path: own for path, own in inside.items() if own not in ([], [DEMONSTRATIONS])}):
+        path, own = next(iter(others.items()))
+        raise PoolError(f"{folder} holds demonstrations ({found[0]}) and {MARKS[own[0]]} ({path}); name the folders")
+    return found or [folder]

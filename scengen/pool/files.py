@@ -92,7 +92,8 @@ def replace_file(path: Path, content: bytes) -> None:
     """Write a file. If the process dies at any moment, the file is either the old one or the new one."""
     part = path.with_name(path.name + ".part")
     try:
-        with open(part, "wb") as file:
+        part.unlink(missing_ok=True)  # a link there would lead elsewhere
+        with open(part, "xb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())

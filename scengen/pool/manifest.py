@@ -11,6 +11,7 @@ from ..errors import PoolError, ScengenError
 from ..work.typed import typed
 from .files import FileEntry as FileEntry
 from .files import read_json_file, replace_file
+from .kinds import check_one
 from .untrusted import (
     HASH,
     SHORT_HASH,
@@ -117,6 +118,7 @@ class Manifest:
         Raises:
             PoolError: it does not exist, it is damaged, or it is of another format.
         """
+        check_one(folder)
         path = folder / MANIFEST
         if not path.is_file():
             begun = Path(f"{folder}.run").is_dir()

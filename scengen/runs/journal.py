@@ -15,6 +15,7 @@ from filelock import FileLock, Timeout
 
 from ..errors import PoolError
 from ..pool import PoolRow
+from ..pool.kinds import check_target
 from ..pool.manifest import MANIFEST, FileEntry
 from ..pool.row import SceneRow
 from ..sim.embodiment import action_size
@@ -75,7 +76,8 @@ class Journal:
                 started.
         """
         if not pool.name or pool.name == "..":
-            raise PoolError(f"{pool} cannot become a pool; name a separate folder with {setting}=")
+            raise PoolError(f"{pool} cannot become a pool; name a folder of its own with {setting}=")
+        check_target(pool, manifest, setting)
         try_folder(pool)
         self.folder, self._kind, self._setting = pool.with_name(pool.name + ".run"), kind, setting
         self._path = self.folder / "journal.sqlite"

@@ -103,7 +103,9 @@ def write(path: Path, content: str | bytes) -> None:
             return
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            part.write_bytes(data)
+            part.unlink(missing_ok=True)  # a link there would lead elsewhere
+            with open(part, "xb") as file:
+                file.write(data)
             os.replace(part, path)
         finally:
             part.unlink(missing_ok=True)
@@ -117,13 +119,15 @@ def unfinished(to: Path | str) -> Path:
 
 
 def check_unfinished(to: Path | str) -> None:
-    """Raise `BadConfig` if a target is being written by another command, or was left unfinished by one."""
+    """Raise `BadConfig` if a target is being written by another command, or something else has its unfinished name."""
     part = unfinished(to)
     if not os.path.lexists(part):
         return
     try:
-        with _lock_of(part):
-            raise BadConfig(f"{cut(str(part))} was left by a command that was interrupted; delete it")
+        if not _lock_file(part).is_file():
+            raise BadConfig(f"{cut(str(part))} is in the way, and no command of scengen wrote it; move it elsewhere")
+        with FileLock(_lock_file(part), timeout=0):
+            pass
     except Timeout:
         raise BadConfig(
             f"{cut(str(part))} is being written by another command; wait for it, or name another target"
@@ -135,6 +139,8 @@ def check_unfinished(to: Path | str) -> None:
 @contextmanager
 def appearing(to: Path | str, folder: bool) -> Iterator[Path]:
     """Write a file or folder that appears under its name when it is complete, and is discarded after an error.
+
+    What a command that was killed has left is discarded, too.
 
     Args:
         folder: whether it is a folder, which is made empty; otherwise an empty file.
@@ -148,7 +154,9 @@ def appearing(to: Path | str, folder: bool) -> Iterator[Path]:
     part = unfinished(to)
     try:
         part.parent.mkdir(parents=True, exist_ok=True)
+        check_unfinished(to)
         with _lock_of(part):
+            _discard(part)  # left by a command that was killed
             part.mkdir() if folder else part.touch(exist_ok=False)
             try:
                 yield part
@@ -169,7 +177,7 @@ def _lock_of(part: Path) -> Iterator[None]:
     Raises:
         Timeout: another process holds it.
     """
-    path = part.with_name(f"{part.name}.lock")
+    path = _lock_file(part)
     with FileLock(path, timeout=0):
         try:
             yield
@@ -177,8 +185,13 @@ def _lock_of(part: Path) -> Iterator[None]:
             path.unlink(missing_ok=True)
 
 
+def _lock_file(part: Path) -> Path:
+    """Lock of an unfinished target. It stays there if its command is killed."""
+    return part.with_name(f"{part.name}.lock")
+
+
 def _discard(part: Path) -> None:
-    if part.is_dir():
+    if part.is_dir() and not part.is_symlink():
         shutil.rmtree(part)
     else:
         part.unlink(missing_ok=True)

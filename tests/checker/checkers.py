@@ -6,6 +6,7 @@ why on standard output.
 
 import hashlib
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,7 +18,11 @@ def scengen(folder: Path, level: str, arguments: tuple[str, ...]) -> int:
     """`scengen verify`, as on the command line."""
     from scengen import cli
 
-    return cli.run(["verify", f"pool={folder}", f"level={level}", "json=out.json", "junit=out.xml", *arguments])
+    if (folder / "meta").exists():  # a recording, which `scengen curate` judges; it writes into it
+        shutil.copytree(folder, "out")
+        return cli.run(["curate", "data=out"])
+    junit = ["junit=out.xml"] if (folder / "manifest.json").exists() else []
+    return cli.run(["verify", f"pool={folder}", f"level={level}", "json=out.json", *junit, *arguments])
 
 
 def robosuite(folder: Path, level: str, arguments: tuple[str, ...]) -> int:

@@ -22,6 +22,7 @@ import hostile_files
 import labels
 import losses
 import make_base
+import others
 import scenes
 import witnesses
 from forgery import Case
@@ -30,7 +31,18 @@ from forgery import Case
 def cases() -> list[Case]:
     """The whole corpus."""
     found = []
-    for module in (accepted, scenes, labels, ages, losses, certificates, witnesses, hostile_data, hostile_files):
+    for module in (
+        accepted,
+        scenes,
+        labels,
+        ages,
+        losses,
+        certificates,
+        witnesses,
+        hostile_data,
+        hostile_files,
+        others,
+    ):
         found += [replace(case, kind=module.__name__) for case in module.CASES]
     names = [case.name for case in found]
     twice = {name for name in names if names.count(name) > 1}

@@ -342,7 +342,7 @@ def test_the_wrist_camera_is_given_in_the_hands_frame(witnesses):
 # --- reliability ---------------------------------------------------------------------------------
 
 
-def test_a_killed_recording_leaves_nothing_that_looks_finished(tmp_path, capsys):
+def test_a_killed_recording_leaves_nothing_that_looks_finished_and_starts_over(tmp_path):
     target = tmp_path / "killed"
     command = [sys.executable, "-m", "scengen", "record", f"pool={REFERENCE}", f"to={target}", "cameras=none"]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, env=os.environ)
@@ -352,8 +352,15 @@ def test_a_killed_recording_leaves_nothing_that_looks_finished(tmp_path, capsys)
     process.send_signal(signal.SIGKILL)
     assert process.wait() == -signal.SIGKILL and unfinished.exists()
     assert not target.exists() and not (unfinished / "meta" / "info.json").exists()
-    assert cli.run(command[3:]) == 2
-    assert "killed.unfinished was left by a command that was interrupted; delete it" in capsys.readouterr().err
+    assert cli.run([*command[3:], "n=1"]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["killed"]
+
+
+def test_a_folder_that_no_command_has_left_is_not_discarded(tmp_path, capsys):
+    (tmp_path / "new.unfinished").mkdir()
+    assert cli.run(["record", f"pool={REFERENCE}", f"to={tmp_path / 'new'}", "cameras=none"]) == 2
+    assert "new.unfinished is in the way" in capsys.readouterr().err
+    assert (tmp_path / "new.unfinished").is_dir()
 
 
 def test_a_recording_that_is_being_written_is_left_alone(tmp_path, capsys):

@@ -18,10 +18,15 @@ INFO = {
     "fps": 10,
     "features": {"action": {"dtype": "float32", "shape": [2]}, CAMERA: {"dtype": "video", "shape": [4, 4, 3]}},
     "total_episodes": 1,
-    "robot_type": "panda",
+    "robot_type": "panda_jaw",
 }
 ABOUT = {
     "scengen/task": "domino_single",
+    "scengen/id": "0123456789ab",
+    "scengen/params": "{}",
+    "scengen/horizon": 12.0,
+    "scengen/success": True,
+    "length": 3,
     "dataset_from_index": 0,
     "dataset_to_index": 3,
     f"videos/{CAMERA}/chunk_index": 0,
@@ -84,9 +89,10 @@ def test_a_folder_that_leads_elsewhere_is_not_read(folder, tmp_path):
 )
 def test_paths_of_videos_stay_in_the_folder_whatever_the_recording_says(folder, camera, pattern):
     features = {**INFO["features"], camera: {"dtype": "video", "shape": [4, 4, 3]}}
-    recording = Recording.open(described(folder, video_path=pattern, features=features))
     about = {f"videos/{camera}/{name}": value for name, value in (("chunk_index", 0), ("file_index", 0))}
     about |= {f"videos/{camera}/from_timestamp": 0.0, f"videos/{camera}/to_timestamp": 0.3}
+    pq.write_table(pa.Table.from_pylist([{**ABOUT, **about}]), folder / "meta/episodes/chunk-000/file-000.parquet")
+    recording = Recording.open(described(folder, video_path=pattern, features=features))
     episode = EpisodeData(0, about, {})
     refused(lambda: [*recording.frames(episode, camera)], "outside the folder|is missing")
 
@@ -129,12 +135,36 @@ def test_a_table_that_unpacks_to_too_much_is_refused(folder, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "changed",
-    [{"fps": "10"}, {"fps": 0}, {"fps": 1e9}, {"features": []}, {"features": {"action": "float32"}}, {"fps": None}],
+    ("changed", "says"),
+    [
+        ({"fps": "10"}, "fps = '10'; it must be a number"),
+        ({"fps": 0}, "fps = 0; it must lie in"),
+        ({"fps": 1e9}, r"fps = 1e\+09; it must lie in"),
+        ({"features": []}, "features = .*; it must be a mapping"),
+        ({"features": {"action": "float32"}}, "features.action = 'float32'; it must be a group"),
+        ({"fps": None}, "fps is missing"),
+        ({"robot_type": "r2d2"}, "robot_type = 'r2d2'; it must be"),
+    ],
     ids=str,
 )
-def test_a_description_of_other_types_is_no_recording(folder, changed):
-    refused(lambda: Recording.open(described(folder, **changed)), "is not a recording of scengen")
+def test_a_description_of_other_types_names_file_field_and_value(folder, changed, says):
+    refused(lambda: Recording.open(described(folder, **changed)), f"not a recording of scengen: meta/info.json: {says}")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("scengen/success", "yes", "scengen/success of episode 0 is 'yes'"),
+        ("dataset_to_index", -1, "dataset_to_index of episode 0 is -1"),
+        ("scengen/horizon", float("nan"), "scengen/horizon of episode 0 is nan"),
+        (f"videos/{CAMERA}/from_timestamp", None, f"videos/{CAMERA}/from_timestamp of episode 0 is None"),
+        ("scengen/id", "", "the column scengen/id is missing"),
+    ],
+)
+def test_a_table_of_other_types_names_file_field_and_value(folder, name, value, says):
+    row = {key: told for key, told in {**ABOUT, name: value}.items() if told != ""}
+    pq.write_table(pa.Table.from_pylist([row]), folder / "meta/episodes/chunk-000/file-000.parquet")
+    refused(lambda: Recording.open(folder), f"meta/episodes: {says}")
 
 
 @pytest.mark.parametrize("shape", [[-1], [10**9, 10**9], ["x"], "2"], ids=str)

@@ -30,6 +30,10 @@ def command(arguments: Arguments) -> int:
     out.print(table)
     if curated.uncompared:
         remark("pictures were not compared with the replay: no OpenGL, or every replay failed")
+    if settings.replay:
+        say(f"claimed, and not checked: {', '.join(curated.claimed)}")
+    else:
+        remark("nothing was replayed: states, results and the table of episodes are claimed")
     if undecided := curated.undecided:
         say(
             f"{len(undecided)} flagged episodes wait for a decision: open {folder / 'index.html'}, and save {DECISIONS}"

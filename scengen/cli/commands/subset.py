@@ -4,15 +4,15 @@ import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...errors import BadConfig, PoolError
+from ...errors import BadConfig
 from ...ood.analysis.coverage import farthest_points
 from ...ood.analysis.redraw import batch_of, task_of
 from ...ood.analysis.space import of_tables
-from ...pool.manifest import MANIFEST
+from ...pool.kinds import check_target
 from ...pool.writing import write_pool
 from ...samplers.task_files import search_path
 from ...validate import lock
-from ...work.targets import try_folder
+from ...work.targets import appearing, check_unfinished, try_folder
 from . import OK, Arguments, filled, one, say
 from .settings import read
 
@@ -35,8 +35,8 @@ def command(arguments: Arguments) -> int:
         raise BadConfig(
             f"n = {settings.n}; it must lie in [1, {len(pool)}], because {pool.folder} has {len(pool)} scenarios"
         )
-    if (target / MANIFEST).exists():
-        raise PoolError(f"{target} already holds a pool; choose another to=")
+    check_target(target)
+    check_unfinished(target)
     try_folder(target)
     locked = lock.read_lock(pool.folder)
     task = task_of(pool, search_path(arguments))
@@ -46,9 +46,11 @@ def command(arguments: Arguments) -> int:
     about = replace(
         pool.manifest.without_files(), n=settings.n, subset={"of": pool.sha256, "chosen": "max-min coverage"}
     )
-    subset = write_pool(target, about, pool.some(chosen))
-    if locked is not None:
-        shutil.copyfile(pool.folder / lock.LOCK_FILE, target / lock.LOCK_FILE)
+    with appearing(target, folder=True) as part:
+        subset = write_pool(part, about, pool.some(chosen))
+        told = f"pool sha256: {subset.sha256}"
+        if locked is not None:
+            shutil.copyfile(pool.folder / lock.LOCK_FILE, part / lock.LOCK_FILE)
     say(f"wrote {settings.n} of {len(pool)} scenarios to {target}")
-    say(f"pool sha256: {subset.sha256}")
+    say(told)
     return OK

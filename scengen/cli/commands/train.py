@@ -6,10 +6,11 @@ from rich.table import Table
 
 from ...compose import load_task
 from ...errors import BadConfig, cut
+from ...export.dataset import Recording
 from ...export.recording import RecordSettings, record
 from ...learn.data import TrainingData
 from ...learn.train import Trained, TrainSettings, train
-from ...pool.demonstrations import is_demonstrations
+from ...pool.demonstrations import Demonstrations, is_demonstrations
 from ...pool.manifest import MANIFEST
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path, tasks
@@ -51,15 +52,18 @@ def _recording(settings: TrainSettings, arguments: Arguments) -> str:
     Raises:
         ScengenError: `data` is neither, or cannot be recorded.
     """
+    demonstrated = is_demonstrations(settings.data)
     if Path(settings.data, MANIFEST).is_file():
         raise BadConfig(f"data = {cut(settings.data)} is a pool; make demonstrations with scengen demos, or record it")
-    if not is_demonstrations(settings.data):
+    if not demonstrated:
         return settings.data
     to = Path(settings.to, RECORDING)
     if not to.exists():
         wanted = RecordSettings(pool=settings.data, to=str(to), cameras="none")
         with ProgressBar(err, f"record {settings.data}", 0) as progress_bar:
             record(wanted, progress_bar.of, search_path(arguments))
+    if Recording.open(to).source.get("pools") != [Demonstrations.open(settings.data).sha256]:
+        raise BadConfig(f"{to} was recorded from other demonstrations than {settings.data}; choose another to=")
     return str(to)
 
 

@@ -2,7 +2,7 @@
 
 import secrets
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -61,6 +61,7 @@ class VerifySettings:
     others: str
     seed: int | None
     ycb: str | None
+    apart: str | list[str] | None
     json: str | None
     junit: str | None
     workers: Workers
@@ -90,6 +91,8 @@ def command(arguments: Arguments) -> int:
     demonstrated = [f for f in demonstration_folders(settings.pool) if is_demonstrations(f)]
     if demonstrated:
         return _replay_demonstrations(demonstrated, settings, search_path(arguments))
+    if settings.apart is not None:
+        raise BadConfig("apart is for demonstrations, which may be kept apart from pools: leave it out")
     folders = several(settings.pool)
     if settings.ycb is not None:
         for folder in folders:
@@ -193,7 +196,7 @@ def _reproduce(chosen: str, settings: VerifySettings, search: Sequence[str]) -> 
         BadConfig: a setting is given that is for pools.
         UnknownName: there is no such task.
     """
-    for name in ("pool", "hits", "sample", "ycb", "junit"):
+    for name in ("pool", "hits", "sample", "ycb", "apart", "junit"):
         if getattr(settings, name) is not None:
             raise BadConfig(
                 f"{name} is for pools; task={chosen} compares tasks with their stored behaviour: leave it out"
@@ -269,19 +272,23 @@ def _replay_demonstrations(folders: Sequence[str], settings: VerifySettings, sea
     for name in ("sample", "ycb", "junit"):
         if getattr(settings, name) is not None:
             raise BadConfig(f"{name} is for pools; demonstrations are all replayed: leave it out")
-    reports = []
-    for folder in folders:
-        found = Demonstrations.open(folder)
+    every, reports = [Demonstrations.open(folder) for folder in folders], []
+    pools = _kept_apart(settings.apart, every)
+    for folder, found in zip(folders, every, strict=True):
         limits = Limits(settings.limit_seconds, settings.limit_mb)
         with ProgressBar(err, f"verify {folder}", len(found), settings.workers) as progress_bar:
             task, oracle = compose.load_task(found.task, search), settings.level == "full"
-            report = verify_demonstrations(found, task, settings.workers, limits, oracle, progress_bar.show)
+            named = [pool for pool in pools if pool.sha256 in found.manifest.config.apart]
+            report = verify_demonstrations(found, task, settings.workers, limits, oracle, progress_bar.show, named)
+        _print_differences(report.differences)
         for fault in report.faults[:MAX_PRINTED]:
             warn(f"REFUTED {fault[:2000]}")
         for why in report.declined[:MAX_PRINTED]:
             warn(f"DECLINED {why[:2000]}")
         for remark in report.remarks:
             say(remark)
+        if report.claimed:
+            say(f"claimed, and not checked: {'; '.join(report.claimed)}")
         say(f"{folder}: {report.verdict}: {report.exact} of {report.checked} replay bit for bit")
         reports.append(report)
     if settings.json:
@@ -290,15 +297,34 @@ def _replay_demonstrations(folders: Sequence[str], settings: VerifySettings, sea
     return next(status for verdict, status in WORST.items() if verdicts[verdict])
 
 
-def _print_report(pool: Pool, report: Report) -> None:
-    """Print differences, faults, remarks and counts of a report."""
-    if report.differences:
+def _kept_apart(given: str | list[str] | None, found: Sequence[Demonstrations]) -> list[Pool]:
+    """The pools from which demonstrations were kept apart, as far as they are given.
+
+    Raises:
+        BadConfig: no demonstrations name one of them.
+    """
+    pools = [Pool.open(folder).check() for folder in several(given or [])] if given else []
+    named = {sha256 for each in found for sha256 in each.manifest.config.apart}
+    for pool in pools:
+        if pool.sha256 not in named:
+            raise BadConfig(f"apart = {pool.folder}; the demonstrations name other pools (by sha256): leave it out")
+    return pools
+
+
+def _print_differences(differences: Sequence[Mapping[str, str]]) -> None:
+    """Print differences from the installed task, if there are any."""
+    if differences:
         table = Table("key", "in the pool", "installed", title="the task of this pool differs from the installed file")
-        for d in report.differences[:MAX_PRINTED]:
+        for d in differences[:MAX_PRINTED]:
             table.add_row(d["key"], d["pool"], d["installed"])
         out.print(table)
-        if (more := len(report.differences) - MAX_PRINTED) > 0:
+        if (more := len(differences) - MAX_PRINTED) > 0:
             say(f"and {more} more; json=FILE writes all")
+
+
+def _print_report(pool: Pool, report: Report) -> None:
+    """Print differences, faults, remarks and counts of a report."""
+    _print_differences(report.differences)
     for failure in report.failed[:MAX_PRINTED]:
         name = report.names.get(failure["id"], failure["id"])
         warn(f"{failure['verdict'].upper()} {name}: {failure['reason'][:2000]}")

@@ -23,20 +23,23 @@ import numpy as np
 from ... import compose
 from ...agents.models import made
 from ...errors import PoolError
-from ...export.dataset import EpisodeData, Recording
+from ...export.dataset import CURATION, EpisodeData, Recording
 from ...export.recording import CONTROL_ACTIONS
 from ...export.streams import ENVIRONMENT
 from ...pool.files import read_json_file, replace_file, sha256
 from ...work.parallel import UNTRUSTED_LIMITS, Workers, each
+from ...work.targets import try_folder
 from .checks import Subject, check_rows, found
 from .findings import REPORTS, SCHEMA, EpisodeReport, Finding, read_reports
+from .labels import CLAIMED
 from .people import DECISIONS, SCORES, Decision, decisions_of_people, scores_by_people
 from .remarks import with_remarks
 from .replays import Recorded, Replayed, comparison_of, lost, replayed
 from .score import KEPT_SCORE, scores_of, terms_of
 from .videos import FROZEN_CAMERA, Probe, Prober, check_video
+from .whole import Whole
 
-FOLDER = "curation"
+FOLDER = CURATION
 """Folder of the results, below that of the recording."""
 
 
@@ -61,6 +64,8 @@ class Curated:
     """Numbers of the kept episodes."""
     funnel: Mapping[str, int]
     """Number of episodes after each stage."""
+    claimed: tuple[str, ...] = ()
+    """What the recording says and nothing can be compared with."""
     unread: int = 0
     """Number of answers of the model that have no meaning."""
 
@@ -89,27 +94,32 @@ def curate(settings: CurateSettings, progress: Callable[[int, int], None], searc
     """
     recording = Recording.open(settings.data)
     folder = recording.folder / FOLDER
+    for place in (folder, recording.folder / "meta"):
+        try_folder(place)
     count = len(recording.episodes)
     people, decisions = scores_by_people(folder / SCORES, count), decisions_of_people(folder / DECISIONS, count)
-    reports, jobs = _examined(recording, settings, search, lambda done: progress(done, 2 * count))
+    reports, jobs, whole = _examined(recording, settings, search, lambda done: progress(done, 2 * count))
+    claimed = dict.fromkeys([*(f"scengen/{name}" for name in CLAIMED), *whole.claimed])
     for done, (number, played) in enumerate(_replays(jobs, settings.workers), 1):
         progress(count + done, 2 * count)
         report = reports[number]
+        claimed |= dict.fromkeys(played.unknown)
         findings, checks = (*report.findings, *played.findings), (*report.checks, *played.checks)
         reports[number] = replace(report, findings=findings, checks=checks)
     reports, unread = [_with_score(report, people.get(report.episode)) for report in reports], 0
     if settings.model is not None:
         lengths = [int(episode["length"]) for episode in recording.episodes]
         reports, unread = with_remarks(reports, lengths, made(settings.model), settings.model, folder)
-    curated = replace(_decided(recording, tuple(reports), decisions), unread=unread)
+    curated = replace(_decided(recording, tuple(reports), decisions), unread=unread, claimed=tuple(claimed))
     _write(curated, folder)
     return curated
 
 
 def _examined(
     recording: Recording, settings: CurateSettings, search: Sequence[str], progress: Callable[[int], None]
-) -> tuple[list[EpisodeReport], list[Recorded]]:
-    """Reports with the scores of the measured terms, and what is to be replayed."""
+) -> tuple[list[EpisodeReport], list[Recorded], Whole]:
+    """Reports with the scores of the measured terms, what is to be replayed, and what stands beside the rows."""
+    whole = Whole(recording)
     reports, jobs, terms, tasks, solved = [], list[Recorded](), list[dict[str, float]](), list[str](), list[bool]()
     twins: dict[str, int] = {}
     size = recording.picture_size
@@ -120,6 +130,7 @@ def _examined(
         tasks.append(episode.task)
         solved.append(readable and bool(episode.about["scengen/success"]) and bool(episode.columns["next.success"][-1]))
         if readable:
+            findings += whole.of_episode(episode)
             films, told = _videos(episode, recording)
             frozen = {camera: one for camera, one in told if settings.replay and one.check == FROZEN_CAMERA}
             findings += [one for camera, one in told if frozen.get(camera) is not one]
@@ -135,6 +146,8 @@ def _examined(
                 jobs.append(
                     Recorded.of(episode.number, task, episode.about, episode.columns, entries, size, films, frozen)
                 )
+        else:
+            whole.skip(episode)
         about = episode.about
         style = str(about.get("scengen/style", ""))
         reports.append(
@@ -143,8 +156,10 @@ def _examined(
             )
         )
         progress(episode.number + 1)
+    shared = tuple(whole.of_all())
+    reports = [replace(report, findings=(*report.findings, *shared)) for report in reports]
     scores = _scores_of_readable(terms, tasks, solved)
-    return [replace(report, score=score) for report, score in zip(reports, scores, strict=True)], jobs
+    return [replace(report, score=score) for report, score in zip(reports, scores, strict=True)], jobs, whole
 
 
 def _scores_of_readable(

@@ -16,6 +16,8 @@ SCORES = "scores.csv"
 DECISIONS = "decisions.csv"
 SCORE_COLUMNS = ("episode", "score")
 DECISION_COLUMNS = ("episode", "verdict", "who", "why")
+SCORE_TEXTS = ("1", "2", "3", "4", "5")
+"""Scores of people."""
 VERDICTS = ("accept", "reject")
 """Verdicts of people."""
 MAX_CSV = 1_000_000
@@ -43,10 +45,17 @@ def scores_by_people(path: Path, count: int) -> dict[int, int]:
     """
     found = {}
     for place, row in _table(path, SCORE_COLUMNS, count):
-        if row["score"].strip() not in "12345" or not row["score"].strip():
+        if row["score"].strip() not in SCORE_TEXTS:
             raise BadConfig(f"{path}, line {place}: score = {cut(row['score'])!r}; it must be 1 to 5")
-        found[int(row["episode"])] = int(row["score"])
+        score = int(row["score"])
+        _check_same(found.setdefault(int(row["episode"]), score), score, path, place)
     return found
+
+
+def _check_same(before: str | int, now: str | int, path: Path, place: int) -> None:
+    """Raise `BadConfig` if two lines of a table contradict each other."""
+    if before != now:
+        raise BadConfig(f"{path}, line {place}: {now}, an earlier line of this episode says {before}; remove one")
 
 
 def decisions_of_people(path: Path, count: int) -> dict[int, Decision]:
@@ -61,7 +70,9 @@ def decisions_of_people(path: Path, count: int) -> dict[int, Decision]:
         if verdict and verdict not in VERDICTS:
             raise BadConfig(f"{path}, line {place}: verdict = {cut(verdict)!r}; it must be {' or '.join(VERDICTS)}")
         if verdict:
-            found[int(row["episode"])] = Decision(verdict, row["who"].strip(), row["why"].strip())
+            number = int(row["episode"])
+            _check_same(found[number].verdict if number in found else verdict, verdict, path, place)
+            found[number] = Decision(verdict, row["who"].strip(), row["why"].strip())
     return found
 
 

@@ -1,22 +1,22 @@
 """The strictest check of an episode: its actions, played again, must give the recorded states and pictures."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...control.loop import ACTION
-from ...envs.object_state import ObjectState
-from ...envs.observations import cameras_of, streams_of
-from ...episode import Episode, Rules
+from ...envs.object_state import ObjectState, bodies_of
+from ...envs.observations import cameras_of, privileged, streams_of
+from ...episode import Episode, Outcome, Rules
 from ...errors import ScengenError
 from ...export.dataset import rules_of
-from ...export.lerobot import IMAGES_PREFIX
-from ...export.recording import CONTROL_ACTIONS
+from ...export.lerobot import IMAGES_PREFIX, INDEX_FEATURES
+from ...export.recording import CONTROL_ACTIONS, STATE
 from ...export.streams import ENVIRONMENT
 from ...pictures.render import Camera, NoPictures, Picture
 from ...samplers.task import Task
@@ -25,6 +25,7 @@ from ...sim.embodiment import hands
 from ...sim.world import World
 from ...validate.rebuilt import rebuild
 from .findings import Finding
+from .labels import label, wrong_labels, wrong_result
 from .videos import Probe, compared, stands_still
 
 MAX_REPLAY_ERROR = 1e-6
@@ -32,8 +33,10 @@ MAX_REPLAY_ERROR = 1e-6
 precision."""
 FIRST = "_pos.x"
 """End of the name of a body's first entry in the environment state."""
-STREAMS = ("eef_pos", "eef_quat", "joint_pos", "gripper_qpos")
-"""Streams that are compared, without the arm's prefix."""
+RESULTS = ("reward", "next.reward", "next.success", "next.done")
+"""Columns that follow from the outcome of the replay."""
+DERIVED = (*INDEX_FEATURES, STATE, "action", CONTROL_ACTIONS, "waiting")
+"""Columns that the checks of rows compare, with each other or with their numbers."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,11 @@ class Recorded:
     actions: NDArray[np.float32]
     """Actions of all control periods of each row, shape (rows, periods, 7 * arms)."""
     streams: Mapping[str, NDArray[np.float32]]
-    """Streams at the beginning of each row."""
+    """Streams at the beginning of each row, and columns that nobody knows."""
+    results: Mapping[str, NDArray[Any]]
+    """The columns of `RESULTS` that were recorded."""
+    told: Mapping[str, Any]
+    """Row of the table of episodes, without statistics."""
     entries: tuple[str, ...]
     """Names of the entries of the environment state; empty if it was not recorded."""
     size: tuple[int, int]
@@ -80,22 +87,34 @@ class Recorded:
             ScengenError: there are no such rules.
             ValueError: its parameters are not JSON.
         """
-        states = {name: values for name, values in columns.items() if name.endswith(STREAMS) or name == ENVIRONMENT}
+        states = {name: values for name, values in columns.items() if name not in (*DERIVED, *RESULTS)}
+        results = {name: columns[name] for name in RESULTS if name in columns}
+        told = {name: value for name, value in about.items() if not name.startswith("stats/")}
         params, horizon = json.loads(about["scengen/params"]), float(about["scengen/horizon"])
-        actions, entries = columns[CONTROL_ACTIONS], tuple(entries)
-        return cls(number, task, params, horizon, rules_of(about), actions, states, entries, size, films, frozen)
+        actions, rows = columns[CONTROL_ACTIONS], (states, results, told, tuple(entries))
+        return cls(number, task, params, horizon, rules_of(about), actions, *rows, size, films, frozen)
 
-    def readers(self) -> dict[str, Callable[[World], NDArray[Any]]]:
-        """Functions that read the streams from a world."""
+    @property
+    def bodies(self) -> list[str]:
+        """Bodies of the environment state."""
+        return [n.removesuffix(FIRST) for n in self.entries if n.endswith(FIRST) and "_to_robot" not in n]
+
+    def readers(self, scenario: Scenario, text: str) -> dict[str, Callable[[World], NDArray[Any]]]:
+        """Functions that read the streams from a world, of those that are known.
+
+        Args:
+            text: scene of the scenario.
+        """
         robot = self.task.embodiment
         found: dict[str, Callable[[World], NDArray[Any]]] = {n: stream.read for n, stream in streams_of(robot).items()}
+        if not {*self.streams} <= {*found, ENVIRONMENT}:
+            state = ObjectState(bodies_of(self.task, [text]), len(hands(robot)))
+            of_bodies = privileged(state, type(scenario), lambda: scenario.orientation)
+            found |= {name: stream.read for name, stream in of_bodies.items()}
         if self.entries:
-            own = [
-                name.removesuffix(FIRST) for name in self.entries if name.endswith(FIRST) and "_to_robot" not in name
-            ]
-            bodies = {body: f"{body}_vel_lin.x" in self.entries for body in own}
+            bodies = {body: f"{body}_vel_lin.x" in self.entries for body in self.bodies}
             found[ENVIRONMENT] = ObjectState(bodies, len(hands(robot))).read
-        return found
+        return {name: read for name, read in found.items() if name in self.streams}
 
 
 def difference(read: NDArray[np.float64], stored: NDArray[np.float32]) -> float:
@@ -110,6 +129,8 @@ class Replayed:
     findings: tuple[Finding, ...] = ()
     checks: tuple[str, ...] = ("replay",)
     """Names of the checks that were made."""
+    unknown: tuple[str, ...] = ()
+    """Columns that nothing can be compared with."""
 
 
 def replayed(recorded: Recorded) -> Replayed:
@@ -138,25 +159,53 @@ def _fault(recorded: Recorded, explanation: str, row: int | None = None, **numbe
 def _replayed(recorded: Recorded) -> Replayed:
     task = recorded.task
     scenario, robot = task.scenario(recorded.params), task.embodiment
-    world, readers = World.load(rebuild(scenario), robot, visual=bool(recorded.films)), recorded.readers()
+    text = rebuild(scenario)
+    labels = tuple(wrong_labels(recorded.told, task, scenario, text))
+    found = _played(recorded, scenario, World.load(text, robot, visual=bool(recorded.films)), text)
+    return replace(found, findings=(*labels, *found.findings))
+
+
+def _played(recorded: Recorded, scenario: Scenario, world: World, text: str) -> Replayed:
+    robot, readers = recorded.task.embodiment, recorded.readers(scenario, text)
     if recorded.actions.shape[2] != ACTION * len(hands(robot)):
         return _fault(recorded, f"the actions are not those of {robot}")
     with ExitStack() as stack:
         films = _Films(recorded, scenario, world, stack)
-        episode = Episode(scenario, world, recorded.horizon, recorded.rules)
+        episode, over = Episode(scenario, world, recorded.horizon, recorded.rules), None
+        seconds = 0.0
         for row, actions in enumerate(recorded.actions):
-            for name, values in recorded.streams.items():
-                error = difference(readers[name](world), values[row])
+            for name, read in readers.items():
+                error = difference(read(world).ravel(), recorded.streams[name][row].ravel())
                 if not error <= MAX_REPLAY_ERROR:
                     return _fault(
                         recorded, f"replayed, {name} has other values", row, error=error, limit=MAX_REPLAY_ERROR
                     )
             films.compare(row)
             for action in actions:
-                episode.step(action)
+                outcome = episode.step(action)
+                over, seconds = (over, seconds) if over else (outcome, world.time)
+            if wrong := _wrong_results(recorded, row, over):
+                return _fault(recorded, f"replayed, {wrong} has other values", row)
+    unknown = tuple(name for name in recorded.streams if name not in readers)
+    labels = (*wrong_result(recorded.told, over == "success", seconds), *_wrong_absent(recorded, world))
     if episode.outcome != "success":
         return _fault(recorded, f"replayed, the goal is not reached: {episode.reason or 'no outcome'}")
-    return Replayed(films.findings, ("replay", *films.checks))
+    return Replayed((*films.findings, *labels), ("replay", *films.checks), unknown)
+
+
+def _wrong_absent(recorded: Recorded, world: World) -> Iterator[Finding]:
+    """Whether the bodies that the scene lacks are those that the table of episodes names."""
+    there = {world.model.body(i).name for i in range(world.model.nbody)}
+    lacking = [body for body in recorded.bodies if body not in there]
+    told = recorded.told.get("scengen/absent", "")
+    if recorded.entries and sorted(lacking) != sorted(str(told).split(",") if told else []):
+        yield label("absent", f"is {ascii(told)[:60]}, the scene lacks {lacking}")
+
+
+def _wrong_results(recorded: Recorded, row: int, over: Outcome | None) -> str:
+    """The first column of a row that contradicts the outcome so far; empty if none does."""
+    expected = {"next.done": over is not None}
+    return next((n for n, v in recorded.results.items() if v[row] != expected.get(n, over == "success")), "")
 
 
 class _Films:

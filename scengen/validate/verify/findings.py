@@ -95,12 +95,9 @@ class Findings:
 
     def compare_tasks(self, installed: Task, stored: Task) -> None:
         """Note the differences between the manifest's task and the installed one."""
-        node = {key: value for key, value in stored.node.items() if key != "scans"}
-        self.differences = list(differences(installed.node, node))
-        for name in ("code", "category"):
-            here, there = getattr(installed, name), getattr(stored, name)
-            if here != there:
-                self.of_pool(MANIFEST, "refuted", f"the {name} is {there[:60]!a}, that of the task is {here!a}")
+        self.differences = task_differences(installed, stored)
+        for what in wrong_names(installed, stored):
+            self.of_pool(MANIFEST, "refuted", what)
 
     def name_settings(self, settings: CertifySettings, levels: Mapping[str, CertifySettings]) -> None:
         """Note the level whose settings the certificates have, or how they differ from it."""
@@ -189,6 +186,19 @@ class Findings:
             examinations=faults,
             names={id_: self.names[id_] for f in failed if (id_ := f["id"]) in self.names},
         )
+
+
+def task_differences(installed: Task, stored: Task) -> list[dict[str, str]]:
+    """Differences between the installed task and one that a manifest describes, except for scans."""
+    return list(differences(installed.node, {key: value for key, value in stored.node.items() if key != "scans"}))
+
+
+def wrong_names(installed: Task, stored: Task) -> Iterator[str]:
+    """Names of a stored task that are not those of the installed one."""
+    for name in ("code", "category"):
+        here, there = getattr(installed, name), getattr(stored, name)
+        if here != there:
+            yield f"the {name} is {there[:60]!a}, that of the task is {here!a}"
 
 
 def differences(installed: Any, stored: Any, key: str = "") -> Iterator[dict[str, str]]:

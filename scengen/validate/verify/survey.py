@@ -137,7 +137,7 @@ def wrong_funnel(manifest: Manifest, certified: int, first: int, drawn: Survey) 
     infeasible, failed = drawn.infeasible, Counter[str]()
     told = {key: times for key, times in manifest.reasons.items() if key.startswith("feasible: ")}
     if told != dict(infeasible):
-        yield f"the reasons of infeasible draws differ from those of the draws made again, {_shown(infeasible)}"
+        yield f"the reasons of infeasible draws differ from those of the draws made again, {shown(infeasible)}"
     for key, times in manifest.reasons.items():
         name = key.partition(": ")[0]
         if name not in (*CHECKS, PROCESS):
@@ -199,7 +199,7 @@ def wrong_rejects(manifest: Manifest, kept: Sequence[Reject], certified: Collect
         and CHECKS.get(name) in manifest.config.keep
     }
     if Counter(reject.reason for reject in kept) != expected:
-        yield f"{len(kept)} rejects are kept; by keep= and the reasons it should be {_shown(expected)}"
+        yield f"{len(kept)} rejects are kept; by keep= and the reasons it should be {shown(expected)}"
 
 
 def wrong_losses(manifest: Manifest, again: Mapping[int, str]) -> Iterator[str]:
@@ -211,13 +211,24 @@ def wrong_losses(manifest: Manifest, again: Mapping[int, str]) -> Iterator[str]:
     Args:
         again: reason why each of these scenarios is not certified here, by index; empty for one that is.
     """
-    told = Counter({key: times for key, times in manifest.reasons.items() if not key.startswith("feasible: ")})
-    free = (PROCESS,) if manifest.attack is None else (PROCESS, "attack")
+    told = {key: times for key, times in manifest.reasons.items() if not key.startswith("feasible: ")}
+    free = {PROCESS} if manifest.attack is None else {PROCESS, "attack"}
+    if why := unlike(told, Counter(again.values()), free):
+        yield f"certified again, scenarios that it left out fail for other reasons than {why}"
+
+
+def unlike(reasons: Mapping[str, int], again: Counter[str], free: Collection[str]) -> str:
+    """How counted reasons differ from those of what was made again, in words; empty if they do not.
+
+    Args:
+        again: number by reason of what was made again; "" counts successes.
+        free: checks that cannot be repeated: what they count may have any result.
+    """
+    told = Counter(reasons)
     lost = sum(told.pop(key) for key in list(told) if key.partition(": ")[0] in free)
-    found = Counter(again.values())
-    if (missing := told - found) or (found - told).total() > lost:
-        certified = f"; {found['']} of them are certified here" if found[""] else ""
-        yield f"certified again, scenarios that it left out fail for other reasons than {_shown(missing)}{certified}"
+    if not (missing := told - again) and (again - told).total() <= lost:
+        return ""
+    return shown(missing) + (f"; {again['']} of them succeed here" if again[""] else "")
 
 
 def wrong_attack(manifest: Manifest) -> Iterator[str]:
@@ -228,5 +239,6 @@ def wrong_attack(manifest: Manifest) -> Iterator[str]:
         yield f"the attack has refuted {told} scenarios, but shows a way around {len(shown)} of them"
 
 
-def _shown(counts: Mapping[str, int]) -> str:
+def shown(counts: Mapping[str, int]) -> str:
+    """The first of some counts, for messages."""
     return str(dict(itertools.islice(counts.items(), 5)))[:500]

@@ -1,0 +1,108 @@
+"""Files beside the rows of a recording, compared with its rows: statistics, instructions, and the table of episodes."""
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...export.dataset import EpisodeData, Recording
+from ...export.floors import floors_of, with_floors
+from ...export.stats import describe
+from .findings import Finding
+
+TOLERANCE = 1e-6
+"""Largest difference of statistics, relative beyond 1."""
+
+
+@dataclass
+class Whole:
+    """The rows of all episodes that were read."""
+
+    recording: Recording
+    columns: dict[str, list[NDArray[Any]]] = field(default_factory=lambda: defaultdict(list))
+    rows: int = 0
+    """Number of rows so far."""
+    faulty: set[str] = field(default_factory=set)
+    """Columns of which an episode has other statistics than the table of episodes says."""
+
+    partial: bool = False
+    """Whether the rows of an episode cannot be read."""
+
+    def skip(self, episode: EpisodeData) -> None:
+        """Go on after an episode that cannot be read."""
+        self.partial, self.rows = True, int(episode.about["dataset_to_index"])
+
+    def of_episode(self, episode: EpisodeData) -> Iterator[Finding]:
+        """Findings about the files beside the rows of the next episode."""
+        about, recording = episode.about, self.recording
+        if about.get("episode_index") != episode.number or about["dataset_from_index"] != self.rows:
+            yield _finding("EPISODE_TABLE", "the table of episodes leaves rows out, or counts them twice")
+        place = recording.file_of(self.rows)
+        told = tuple(about.get(f"data/{name}") for name in ("chunk_index", "file_index"))
+        if told != place:
+            yield _finding("EPISODE_TABLE", f"the table of episodes names file {told}, the rows are in {place}")
+        self.rows = int(about["dataset_to_index"])
+        yield from _wrong_instruction(episode, recording)
+        for name, values in episode.columns.items():
+            self.columns[name].append(values)
+            kept = {key.rpartition("/")[2]: v for key, v in about.items() if key.startswith(f"stats/{name}/")}
+            if not alike(kept, describe(values)):
+                self.faulty.add(name)
+                yield _finding("STATS", f"the table of episodes has other statistics of {name}")
+
+    def of_all(self) -> Iterator[Finding]:
+        """Findings about the files of the whole recording."""
+        info, stats = self.recording.info, self.recording.stats
+        counts = {"total_episodes": len(self.recording.episodes), "total_frames": self.rows}
+        counts["total_tasks"] = len(self.recording.tasks)
+        for name, here in counts.items():
+            if info.get(name) != here:
+                yield _finding("INFO", f"meta/info.json: {name} is {str(info.get(name))[:40]}, there are {here}")
+        if self.rows != self.recording.total:
+            yield _finding("EPISODE_TABLE", f"the table of episodes has {self.rows} rows of {self.recording.total}")
+        if self.partial:
+            why = "meta/stats.json was not compared: an episode cannot be read"
+            yield from [Finding("STATS", "warning", (), {}, why)] if self.columns else []
+            return
+        for name, parts in self.columns.items():
+            feature = info["features"].get(name, {})
+            made = describe(np.concatenate(parts))
+            if feature.get("dtype") == "float32":
+                made = with_floors(made, floors_of(name, feature.get("names"), tuple(feature["shape"])))
+            if not alike(stats.get(name), made):
+                # one faulty episode does not keep the others out
+                severity = "warning" if name in self.faulty else "error"
+                yield Finding("STATS", severity, (), {}, f"meta/stats.json has other statistics of {name}")
+
+    @property
+    def claimed(self) -> list[str]:
+        """Files with claims that the rows do not decide."""
+        pictures = ["statistics of pictures", "meta/cameras"] if self.recording.cameras else []
+        native = ["native/"] if (self.recording.folder / "native").is_dir() else []
+        return [*pictures, *native, "meta/scengen.json"]
+
+
+def alike(told: Any, made: Mapping[str, Any]) -> bool:
+    """Whether statistics are those that were made again."""
+    if not isinstance(told, Mapping) or told.keys() != made.keys():
+        return False
+    try:
+        pairs = [(np.array(told[name], float), np.array(made[name], float)) for name in made]
+    except (TypeError, ValueError):
+        return False
+    return all(a.shape == b.shape and np.allclose(a, b, TOLERANCE, TOLERANCE) for a, b in pairs)
+
+
+def _wrong_instruction(episode: EpisodeData, recording: Recording) -> Iterator[Finding]:
+    """Whether every row names the instruction of its episode."""
+    numbers, told = {*episode.columns["task_index"].ravel().tolist()}, episode.about.get("tasks")
+    named = [recording.tasks.get(number) for number in numbers]
+    if not isinstance(told, list) or named != told:
+        yield _finding("INSTRUCTION", "task_index, meta/tasks.parquet and the table of episodes contradict each other")
+
+
+def _finding(check: str, why: str) -> Finding:
+    return Finding(check, "error", (), {}, why)

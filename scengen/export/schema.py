@@ -1,0 +1,95 @@
+"""Types of what a recording says of itself. A fault names the file, the field, and what stands there."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
+
+from ..errors import BadConfig, cut
+from ..sim.embodiment import EMBODIMENTS
+from ..work.typed import typed
+
+T = TypeVar("T")
+
+MAX_FPS = 1000
+"""Largest rate of rows [1/s]."""
+MAX_ROW = 2**40
+"""Bound of the numbers of rows, files and frames."""
+
+
+@dataclass(frozen=True)
+class ColumnInfo:
+    """A column in `meta/info.json`."""
+
+    dtype: str
+    shape: list[int]
+    names: list[str] | Mapping[str, Any] | None
+
+
+@dataclass(frozen=True)
+class Info:
+    """The entries of `meta/info.json` that are read."""
+
+    fps: float
+    robot_type: str
+    total_episodes: int
+    features: Mapping[str, ColumnInfo]
+
+
+EPISODE: Mapping[str, type] = {
+    "dataset_from_index": int,
+    "dataset_to_index": int,
+    "length": int,
+    "scengen/task": str,
+    "scengen/id": str,
+    "scengen/params": str,
+    "scengen/horizon": float,
+    "scengen/success": bool,
+}
+"""Columns of the table of episodes that are read, with their types."""
+VIDEO: Mapping[str, type] = {"chunk_index": int, "file_index": int, "from_timestamp": float, "to_timestamp": float}
+"""Columns of each camera in the table of episodes, with their types."""
+
+
+def check_info(info: Mapping[str, Any]) -> Info:
+    """The content of `meta/info.json` with its types.
+
+    Raises:
+        BadConfig: it is something else.
+    """
+    found = _of_file("meta/info.json", Info, info)
+    if not 0 < found.fps <= MAX_FPS:
+        raise BadConfig(f"meta/info.json: fps = {found.fps:g}; it must lie in (0, {MAX_FPS}]")
+    if found.robot_type not in EMBODIMENTS:
+        told = f"robot_type = {cut(repr(found.robot_type))}; it must be {', '.join(EMBODIMENTS)}"
+        raise BadConfig(f"meta/info.json: {told}")
+    return found
+
+
+def check_episode(number: int, row: Mapping[str, Any], cameras: list[str]) -> None:
+    """Raise `BadConfig` unless a row of the table of episodes has the columns that are read, with their types."""
+    of_videos = {f"videos/{camera}/{name}": kind for camera in cameras for name, kind in VIDEO.items()}
+    for name, kind in {**EPISODE, **of_videos}.items():
+        if name not in row:
+            raise BadConfig(f"meta/episodes: the column {name} is missing")
+        value = row[name]
+        right = isinstance(value, (int, float) if kind is float else kind) and isinstance(value, bool) == (kind is bool)
+        if not right or (kind in (int, float) and not 0 <= value < MAX_ROW):
+            raise BadConfig(f"meta/episodes: {name} of episode {number} is {cut(repr(value))}")
+
+
+def _of_file(file: str, cls: type[T], node: Mapping[str, Any]) -> T:
+    """The known entries of a file as an object; other entries are left alone."""
+    try:
+        return typed("", cls, _known(cls, node), exact=True)
+    except BadConfig as error:
+        raise BadConfig(f"{file}: {error}") from None
+
+
+def _known(cls: type, node: Mapping[str, Any]) -> dict[str, Any]:
+    found = {f.name: node[f.name] for f in fields(cls) if node.get(f.name) is not None}
+    if isinstance(columns := found.get("features"), Mapping):
+        found["features"] = {
+            str(name): _known(ColumnInfo, column) if isinstance(column, Mapping) else column
+            for name, column in columns.items()
+        }
+    return found

@@ -1,0 +1,43 @@
+"""What a folder is, by the file that marks it: a pool, demonstrations, and so on. A folder is one thing."""
+
+import os
+from pathlib import Path
+
+from ..errors import PoolError
+
+POLICY = "policy.json"
+"""File that marks a trained policy."""
+EPISODES = "episodes.jsonl"
+"""File that marks an evaluation."""
+MARKS = {
+    "manifest.json": "a pool",
+    "demonstrations.json": "demonstrations",
+    "index.json": "an index of pools",
+    "meta/info.json": "a recording",
+    POLICY: "a trained policy",
+    EPISODES: "an evaluation",
+}
+"""Meaning of the file that marks a folder, by its path in the folder."""
+
+
+def marks(folder: str | Path) -> list[str]:
+    """Files that mark a folder. Links and pipes count, too."""
+    return [mark for mark in MARKS if os.path.lexists(Path(folder, mark))]
+
+
+def check_one(folder: str | Path) -> None:
+    """Raise `PoolError` if a folder is two things: two commands would read different data from it."""
+    if len(found := marks(folder)) > 1:
+        what = " and ".join(f"{MARKS[mark]} ({mark})" for mark in found)
+        raise PoolError(f"{folder} is {what}; a folder must be one of them: move the others elsewhere")
+
+
+def check_target(folder: str | Path, mark: str = "", setting: str = "to") -> None:
+    """Raise `PoolError` if a folder to be written is a thing of another kind.
+
+    Args:
+        mark: file that marks what is to be written, if it may be there already.
+        setting: name of the setting that names the folder.
+    """
+    if others := [other for other in marks(folder) if other != mark]:
+        raise PoolError(f"{folder} is {MARKS[others[0]]} already ({others[0]}); choose another {setting}=")
