@@ -106,6 +106,7 @@ class Endpoint:
             Refusal: the endpoint refuses the request.
             ModelError: it stays busy, or gives no whole answer.
         """
+        last = ModelError("")
         for tried in range(1, TRIES + 1):
             wait = None
             try:

@@ -101,9 +101,9 @@ def _content(request: urllib.request.Request, timeout: float) -> bytes:
 
 
 class _NoRedirect(urllib.request.HTTPRedirectHandler):
-    """A redirect is an answer like another one that is no success."""
+    """A redirect counts as a failed request."""
 
-    def redirect_request(self, *_: Any) -> None:
+    def redirect_request(self, *_: Any, **__: Any) -> None:
         return None
 
 

@@ -262,7 +262,7 @@ def _with_lists(plain: Mapping[str, Any], facts: Mapping[str, Fact]) -> dict[str
 
 
 def _entry(entry: Mapping[str, Any], facts: Mapping[str, Fact]) -> dict[str, Any]:
-    lists = {name: [entry[name]] for name in LISTS if isinstance(entry.get(name), str)}
+    lists: dict[str, Any] = {name: [entry[name]] for name in LISTS if isinstance(entry.get(name), str)}
     name, answer = entry.get("fact"), entry.get("answer")
     if isinstance(name, str) and name in facts and not facts[name].options:
         lists.pop("answer", None)

@@ -92,8 +92,9 @@ def is_pointer(file: BufferedReader) -> bool:
     return bool(found) and found.startswith(_POINTER_START)  # type: ignore[union-attr]
 
 
-class _Plain(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """A loader that refuses aliases, by which a small file can stand for any amount of data."""
+class _Plain(yaml.SafeLoader):
+    """A loader that refuses aliases, by which a small file can stand for any amount of data. The faster loader in C does
+    not call `compose_node`."""
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.AliasEvent):
