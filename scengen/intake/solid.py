@@ -173,7 +173,7 @@ def content(path: str) -> bytes:
     try:
         if file.is_dir():
             raise BadConfig(f"{cut(path)} is a folder; name a mesh file")
-        if not file.is_file():
+        if not file.exists():
             siblings = [p.name for p in file.parent.iterdir()] if file.parent.is_dir() else []
             raise BadConfig(f"there is no file {cut(path)}{nearest(file.name, siblings)}; name a mesh file")
         if ending not in FORMATS:
