@@ -209,3 +209,9 @@ def test_values_and_deletions_that_hydra_takes_otherwise_have_a_remedy(argv, say
     assert cli.run(argv) == 2
     told = capsys.readouterr().err
     assert says in told and told.count("\n") == 1
+
+
+@pytest.mark.parametrize("argv", [("curate", "data=x"), ("verify", "pool=x"), ("record", "pool=x", "to=y")])
+def test_a_number_of_workers_is_limited_in_every_command(argv, capsys):
+    assert cli.run((*argv, "workers=100000000")) == 2
+    assert "workers = 100000000; it must be at most 256" in capsys.readouterr().err
