@@ -8,6 +8,7 @@ import itertools
 import logging
 import math
 import re
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from .errors import BadConfig, UnknownName, cut
+from .errors import SHOWN_LENGTH, BadConfig, UnknownName, cut
 from .samplers.task import Task, load
 from .samplers.task_files import (
     ORIGINS,
@@ -252,7 +253,7 @@ def _check_override(verb: str, text: str) -> None:
         raise BadConfig(f"{quoted} is nested too deeply; quote it if the brackets are part of a name")
     override = _parsed(text)
     if override is None or not override.key_or_group:
-        raise BadConfig(f"{quoted} is not an override; expected key=value, quoted if the value holds spaces or commas")
+        raise BadConfig(f"{quoted} is not an override; expected key=value{_quoted(text)}")
     key = override.key_or_group
     if override.package is not None:
         raise BadConfig(f"{quoted}: a setting has no package after @; see scengen {verb} --help")
@@ -260,7 +261,7 @@ def _check_override(verb: str, text: str) -> None:
         raise BadConfig(f"{quoted} has multiple values; give one, or quote a value with commas: {key}='...'")
     if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
         raise BadConfig(f"{quoted}: expected hydra.searchpath=[file:///folder], the only setting of Hydra for scengen")
-    if override.is_delete() and "." not in key:
+    if override.is_delete() and not key.startswith("task."):
         raise BadConfig(f"{quoted}: {key} cannot be deleted; leave it out for its default, or give another value")
     if key == "hydra.searchpath":
         folders = override.value()
@@ -276,6 +277,15 @@ def _check_override(verb: str, text: str) -> None:
         raise BadConfig(f"{quoted}: expected the name of a file of conf/{key} without .yaml; {_files_of(key)}")
     if key in ("task", "certify", "executor") and override.value() is None:
         raise BadConfig(f"{quoted}: leave it out, or name a file of conf/{key}")
+
+
+def _quoted(text: str) -> str:
+    """The remedy for a value with letters that mean something to Hydra, as a shell takes it."""
+    key, given, value = text.partition("=")
+    fixed = f'{key}="{value}"'
+    if given and len(text) < SHOWN_LENGTH and re.fullmatch(r"[\w.+]+", key) and _parsed(fixed):
+        return f"; quote the value twice: {shlex.quote(fixed)}"
+    return ", quoted if the value holds spaces or commas"
 
 
 def _files_of(group: str) -> str:
@@ -328,7 +338,7 @@ def combinations(verb: str, overrides: Sequence[str]) -> list[Combination]:
     Raises:
         ScengenError: one line that says what is wrong.
     """
-    overrides = [_with_task_names(text) for text in overrides]
+    overrides = [_with_task_names(text) if verb != "new" else text for text in overrides]
     with initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
         parser = OverridesParser.create(config_loader=GlobalHydra.instance().config_loader())
         try:
@@ -397,8 +407,9 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
     seen: list[str] = []
     for part in path.split("."):
         if not isinstance(node, DictConfig):
-            return None
-        if part not in node:
+            whole = ".".join(seen)
+            return BadConfig(f"{path}: {whole} has no settings in it; give {whole}=...")
+        if part not in node.keys():  # noqa: SIM118  (`in` leaves out what has no value yet)
             known = {*map(str, node), *([] if seen else groups(verb))}
             if seen == ["executor"] and not known:
                 return BadConfig(f"{path} is a setting of executor=ray; give that, too")
@@ -407,7 +418,7 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
                 return BadConfig(f"{unknown}; +{path}=... adds one")
             return unknown
         seen.append(part)
-        node = node[part]
+        node = None if OmegaConf.is_missing(node, part) else node[part]
     return None
 
 

@@ -263,7 +263,7 @@ def store_in_pool(report: AttackReport, folder: Path) -> dict[str, Any]:
     """
     files = []
     for hit in report.hits:
-        content = (report.folder / f"{hit.name}.npz").read_bytes()
+        content = read_plain(report.folder / f"{hit.name}.npz", MAX_HIT)
         write(folder / HITS_FOLDER / f"{hit.name}.npz", content)
         files.append({"file": f"{HITS_FOLDER}/{hit.name}.npz", "sha256": sha256(content), **hit.plain()})
     return {**report.plain(), "hits": files}

@@ -7,9 +7,12 @@ certificate. Reset samples nothing: the seed selects one of the stored scenarios
 """
 
 import threading
+import warnings
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import gymnasium
@@ -277,6 +280,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             super().reset(seed=seed)
             if seed is not None:
                 self._next = seed % len(self._rows)
+            elif self._world is None and not options:
+                _warn_of_equals(self)
             named = (options or {}).get("scenario")
             number = self._next if named is None else self._rows.find(str(named))
             self._next = (number + 1) % len(self._rows)
@@ -416,6 +421,24 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Labels of the running scenario. A policy that sees them can memorise scenarios."""
         row = self._row
         return {"scenario": row.id, "split": row.split, "axes": list(row.axes), "scene_sha256": row.scene_sha256}
+
+
+_unseeded: "weakref.WeakSet[PoolEnv]" = weakref.WeakSet()
+"""Environments whose first scenario was not chosen by a seed."""
+
+
+def _warn_of_equals(env: PoolEnv) -> None:
+    """Warn if another environment without a seed plays the same scenarios in the same order."""
+    if any(other._rows[0].id == env._rows[0].id and len(other._rows) == len(env._rows) for other in _unseeded):
+        _tell_of_equals()
+    _unseeded.add(env)
+
+
+@cache
+def _tell_of_equals() -> None:
+    """Warn once in a process."""
+    why = "several environments were reset without a seed: each plays the same scenarios in the same order"
+    warnings.warn(f"{why}; give seeds, such as envs.reset(seed=0), which gives each its own", stacklevel=4)
 
 
 def _revived(kind: type[PoolEnv], arguments: Mapping[str, Any], progress: Mapping[str, Any]) -> PoolEnv:

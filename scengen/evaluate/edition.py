@@ -130,6 +130,8 @@ class Edition:
             given = cut(repr(given), 20)
             raise BadConfig(f"{path} has format {given}; this version reads format {FORMAT}; install another one")
         told = typed(str(path), EditionFile, node, exact=True)
+        if told.level not in (levels := sorted(file.stem for file in (conf_dir() / "certify").glob("*.yaml"))):
+            raise UnknownName(f"level of {path}", told.level, levels)
         sets = {key: tuple(Frozen.parse(line, f"{path}, {key}") for line in lines) for key, lines in told.sets.items()}
         for key, scenarios in sets.items():
             indices = [scenario.index for scenario in scenarios]

@@ -19,6 +19,7 @@ from ..errors import BadConfig, UnknownName, cut
 from ..geometry import Mat3
 from ..sim.scene_text import emit
 from ..work.parallel import Limits, each
+from ..work.plain import read_plain
 from .feet import MAX_LEAN, feet
 from .pieces import Pieces, Surface, cut_up, one_hull
 from .polygons import Indices
@@ -293,9 +294,9 @@ def stored_figures(request: IntakeRequest, folder: Path) -> dict[str, Any] | Non
     """
     wanted = key(request, hashlib.sha256(content(request.mesh)).hexdigest())
     try:
-        figures = json.loads((folder / "asset.json").read_text())
-        sha256 = hashlib.sha256((folder / "asset.xml").read_bytes()).hexdigest()
+        figures = json.loads(read_plain(folder / "asset.json"))
+        sha256 = hashlib.sha256(read_plain(folder / "asset.xml")).hexdigest()
         same = figures["key"] == wanted and figures["sha256"]["asset.xml"] == sha256
-    except (OSError, ValueError, KeyError, TypeError):  # there is no asset, or the files are not ours
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # there is no asset, or the files are not ours
         return None
     return figures if same else None

@@ -33,6 +33,8 @@ PLY_TYPES = {
 """Numpy's names of the types in PLY files."""
 PLY_ORDERS = {b"ascii": "", b"binary_little_endian": "<", b"binary_big_endian": ">"}
 """Byte orders of the formats of PLY files; empty for text."""
+MAX_STL_NAME = 1000
+"""Largest length of the first line of an STL file in text [bytes], after which its first triangle begins."""
 PLY_CORNERS = ("vertex_indices", "vertex_index")
 """Names of the property that lists the corners of a polygon."""
 
@@ -43,8 +45,25 @@ def load(data: bytes, ending: str) -> tuple[Points, Polygons]:
     Raises:
         Exception: the file is damaged; the type of the error depends on the format.
     """
+    data = _whole_stl(data) if ending == "stl" else data
     readers: dict[str, Callable[[bytes], tuple[Points, Polygons]]] = {"obj": _obj, "off": _off, "ply": _ply}
     return readers[ending](data) if ending in readers else _by_trimesh(data, ending)
+
+
+def _whole_stl(data: bytes) -> bytes:
+    """A binary STL file without what follows its triangles; a text as it is.
+
+    Raises:
+        EOFError: it holds fewer triangles than it announces.
+    """
+    head, size = 84, 50  # of the header with the number of triangles, and of a triangle [bytes]
+    count = int.from_bytes(data[80:head], "little")
+    is_text = data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:MAX_STL_NAME]
+    if len(data) < head or (is_text and len(data) != head + size * count):
+        return data
+    if (whole := (len(data) - head) // size) < count:
+        raise EOFError(f"it announces {count} triangles and holds {whole}")
+    return data[: head + size * count]
 
 
 def _by_trimesh(data: bytes, ending: str) -> tuple[Points, Polygons]:

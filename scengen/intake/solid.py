@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..assets.mesh_prop import Points
 from ..errors import BadConfig, UnknownName, cut, nearest
 from ..geometry import Mat3
+from ..work.plain import read_plain
 from ..work.targets import remedy
 from .crossing import longest_crossing
 from .mesh_file import load
@@ -172,7 +173,7 @@ def content(path: str) -> bytes:
     try:
         if file.is_dir():
             raise BadConfig(f"{cut(path)} is a folder; name a mesh file")
-        if not file.is_file():
+        if not file.exists():
             siblings = [p.name for p in file.parent.iterdir()] if file.parent.is_dir() else []
             raise BadConfig(f"there is no file {cut(path)}{nearest(file.name, siblings)}; name a mesh file")
         if ending not in FORMATS:
@@ -180,7 +181,9 @@ def content(path: str) -> bytes:
             raise BadConfig(f"{cut(path)}: no mesh format named {cut(repr(file.suffix))}; known: {known}")
         if file.stat().st_size > MAX_BYTES:
             raise BadConfig(f"{cut(path)} has more than {MAX_BYTES // 10**6} MB; give a mesh with fewer triangles")
-        return file.read_bytes()
+        return read_plain(file, MAX_BYTES)
+    except ValueError as error:
+        raise BadConfig(f"{cut(path)} {str(error).removeprefix('it ')}") from None
     except OSError as error:
         raise BadConfig(f"{cut(path)} cannot be read: {remedy(error) or 'choose another file'}") from None
 
@@ -214,10 +217,13 @@ def _manifold(path: str, points: Points, faces: Indices) -> Manifold:
     if manifold.status() != Error.NoError:
         directed = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         _, uses = np.unique(directed, axis=0, return_counts=True)
-        if open_edges := int((uses % 2).sum()):
+        if open_edges := int((uses == 1).sum()):
             raise BadConfig(
                 f"{cut(path)} is open: {open_edges} edges have a triangle on one side only; close its holes"
             )
+        if crowded := int((uses > 2).sum()):
+            told = f"{crowded} edges have three or more triangles"
+            raise BadConfig(f"{cut(path)} has doubled or inner faces: {told}; remove them")
         raise BadConfig(f"{cut(path)} has triangles that face both ways; make all of them face outwards")
     parts = sorted(manifold.decompose(), key=lambda part: part.volume(), reverse=True)
     for part in parts:

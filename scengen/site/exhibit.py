@@ -29,6 +29,7 @@ from ..validate.certify import certify
 from ..validate.identity import source_sha256
 from ..validate.playable import check_row, stored_world
 from ..validate.rebuilt import rebuild
+from ..work.plain import read_plain
 from ..work.targets import write
 from ..work.typed import typed
 from .films import record
@@ -134,8 +135,8 @@ class Exhibit:
     @classmethod
     def read(cls, folder: Path) -> "Exhibit | None":
         """The exhibit in a folder; None if there is no whole one."""
-        with suppress(OSError, ValueError, BadConfig):
-            return typed("", cls, json.loads((folder / DESCRIPTION).read_text()), exact=True)
+        with suppress(OSError, ValueError, BadConfig, RecursionError):
+            return typed("", cls, json.loads(read_plain(folder / DESCRIPTION)), exact=True)
         return None
 
 

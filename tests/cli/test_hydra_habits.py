@@ -191,3 +191,27 @@ def test_bash_gets_what_comes_after_its_own_word_breaks(tmp_path):
     path = f"{tmp_path}:/usr/bin:/bin"
     done = subprocess.run(["bash", "-c", typed], capture_output=True, text=True, env={"PATH": path})
     assert done.stdout.split() == ["domino_select", "domino_single"] and not done.stderr
+
+
+@pytest.mark.parametrize(
+    ("argv", "says"),
+    [
+        (("verify", "mujoco", "mujoco.x=1"), "mujoco.x: mujoco has no settings in it; give mujoco=..."),
+        (("new", "task=all", "package=p"), "task = all; give a word"),
+        (("generate", "task=domino_single", "n=1", "~certify.robust"), "certify.robust cannot be deleted"),
+        (("evaluate", "~client.x"), "client.x cannot be deleted"),
+        (("agent", "model=a=b"), "quote the value twice: 'model=\"a=b\"'"),
+        (("show", "pool=x{y"), "quote the value twice: 'pool=\"x{y\"'"),
+        (("generate", "task=domino_single", "task.horizon.x=3"), "task.horizon has no settings in it"),
+    ],
+)
+def test_values_and_deletions_that_hydra_takes_otherwise_have_a_remedy(argv, says, capsys):
+    assert cli.run(argv) == 2
+    told = capsys.readouterr().err
+    assert says in told and told.count("\n") == 1
+
+
+@pytest.mark.parametrize("argv", [("curate", "data=x"), ("verify", "pool=x"), ("record", "pool=x", "to=y")])
+def test_a_number_of_workers_is_limited_in_every_command(argv, capsys):
+    assert cli.run((*argv, "workers=100000000")) == 2
+    assert "workers = 100000000; it must be at most 256" in capsys.readouterr().err

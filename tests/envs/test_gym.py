@@ -1,5 +1,6 @@
 """The Gymnasium environment plays what the certificate speaks of, and nothing else reaches the simulator."""
 
+import pickle
 import shutil
 import warnings
 from unittest import mock
@@ -13,7 +14,7 @@ from helpers import REFERENCE, pictures_are_possible
 
 from scengen import list_tasks, load_task
 from scengen.control.teleop import LARGEST_CHANGE
-from scengen.envs import observations
+from scengen.envs import gym, observations
 from scengen.envs.gym import PoolEnv, register
 from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.pool import Pool
@@ -353,3 +354,25 @@ def test_cameras_see_the_scene():
     with pytest.raises(UnknownName, match="did you mean 'agentview'"):
         env.render()
     env.close()
+
+
+def test_a_pool_is_found_from_another_working_directory(monkeypatch, tmp_path):
+    monkeypatch.chdir(REFERENCE.parent)
+    env = PoolEnv("domino_single", REFERENCE.name)
+    monkeypatch.chdir(tmp_path)
+    env.reset(seed=1)
+    copied = pickle.loads(pickle.dumps(env))
+    assert copied.reset(seed=2)[1].keys() == env.reset(seed=2)[1].keys()
+
+
+def test_environments_that_play_the_same_scenarios_are_said_to_once():
+    gym._tell_of_equals.cache_clear()
+    with pytest.warns(UserWarning, match="give seeds") as told:
+        envs = [PoolEnv("domino_single", REFERENCE) for _ in range(3)]
+        for env in envs:
+            env.reset()
+    assert len(told) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for seed, env in enumerate(PoolEnv("domino_single", REFERENCE) for _ in range(2)):
+            env.reset(seed=seed)

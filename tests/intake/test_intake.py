@@ -606,3 +606,25 @@ class TestCommand:
 def test_an_unknown_unit_is_no_matter_of_the_command_line_alone():
     with pytest.raises(BadConfig, match="give one of them"):
         make_asset(IntakeRequest("nowhere.stl", mass=1.0, density=1.0))
+
+
+def test_doubled_faces_are_not_called_open(tmp_path):
+    twice = trimesh.Trimesh(BOX.vertices, np.vstack([BOX.faces, BOX.faces[:2]]), process=False)
+    told = refusal(tmp_path, "twice.obj", twice.export(file_type="obj"))
+    assert "has doubled or inner faces: 5 edges have three or more triangles; remove them" in told
+
+
+def test_an_stl_that_is_cut_short_is_named_and_what_follows_its_triangles_is_ignored(tmp_path):
+    data = BOX.export(file_type="stl")
+    count = len(BOX.faces)
+    assert f"announces {count} triangles and holds {count - 2}" in refusal(tmp_path, "short.stl", data[:-60])
+    text = BOX.export(file_type="stl_ascii").encode()
+    for number, content in enumerate((data, data + b"\0" * 77, b"solid" + data[5:], text)):
+        (tmp_path / f"{number}.stl").write_bytes(content)
+        assert read(str(tmp_path / f"{number}.stl")).manifold.volume() == pytest.approx(BOX.volume, rel=1e-5)
+
+
+@pytest.mark.parametrize("ending", ["stl", "obj", "glb"])
+def test_a_pointer_of_git_lfs_is_called_that(tmp_path, ending):
+    pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 12\n"
+    assert "is a pointer of Git LFS" in refusal(tmp_path, f"x.{ending}", pointer)

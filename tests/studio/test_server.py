@@ -106,3 +106,9 @@ def test_only_loopback_is_bound_by_default(studio):
     if not other.startswith("127."):
         with pytest.raises(OSError):
             socket.create_connection((other, studio.server.get_port()), timeout=2)
+
+
+def test_a_request_that_says_nothing_of_encodings_is_answered(studio):
+    with socket.create_connection(("127.0.0.1", studio.server.get_port()), timeout=20) as peer:
+        peer.sendall(f"GET /{studio.token}/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
+        assert peer.recv(12) == b"HTTP/1.1 200"

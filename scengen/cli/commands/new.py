@@ -23,7 +23,7 @@ PACKAGE = "my_tasks"
 """Name of the package in the template that is copied."""
 MAX_NAME = 60
 """Largest length of a name [characters]: a part of a path may have at most 255 bytes."""
-RESERVED = {"task": ("conf",), "package": ("conf", "scengen", "test", "tests")}
+RESERVED = {"task": ("all", "conf"), "package": ("conf", "scengen", "test", "tests")}
 """Names that the new package uses otherwise."""
 
 

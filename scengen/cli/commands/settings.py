@@ -10,6 +10,7 @@ from ...samplers.task import Task, load
 from ...samplers.task_files import groups
 from ...validate.settings import CertifySettings
 from ...work.cluster import AUTO, Cluster
+from ...work.limits import MAX_SETTINGS
 from ...work.machine import cores
 from ...work.parallel import Workers
 from ...work.typed import typed
@@ -70,6 +71,8 @@ def _workers(count: Any, executor: Mapping[str, Any] | None) -> Workers:
     """
     if count != AUTO and (isinstance(count, bool) or not isinstance(count, int)):
         raise BadConfig(f"workers = {cut(repr(count))}; it must be a whole number, or {AUTO}")
+    if not executor and count != AUTO and not 1 <= count <= (most := MAX_SETTINGS["workers"]):
+        raise BadConfig(f"workers = {cut(str(count))}; it must be at {f'most {most}' if count > 0 else 'least 1'}")
     if not executor:
         return cores() if count == AUTO else count
     cluster = typed("executor", Cluster, {**executor, "count": None if count == AUTO else count})
