@@ -127,7 +127,8 @@ def primitive(call: Call, world: World, strict: bool = True) -> Primitive:
     if call.name not in found:
         raise BadCall(f"there is no tool {cut(repr(call.name))}; tools: {', '.join(found)}")
     try:
-        given = _arguments(call, strict) or {}
+        given = _arguments(call, strict)
+        given = {} if given is None or given == "" else given
     except FormatError:
         raise BadCall(f"the arguments of {call.name} are not JSON") from None
     if not isinstance(given, dict):

@@ -93,8 +93,10 @@ def is_pointer(file: BufferedReader) -> bool:
 
 
 class _Plain(yaml.SafeLoader):
-    """A loader that refuses aliases, by which a small file can stand for any amount of data. The faster loader in C does
-    not call `compose_node`."""
+    """A loader that refuses aliases, by which a small file can stand for any amount of data.
+
+    The faster loader in C does not call `compose_node`.
+    """
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.AliasEvent):

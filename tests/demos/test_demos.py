@@ -209,7 +209,7 @@ def shifted(row):
 
 
 FORGERIES = {
-    "another sha256": lambda row: replace(row, witness=shifted(row).witness),
+    "a different sha256": lambda row: replace(row, witness=shifted(row).witness),
     "other bits": shifted,
     "filter cannot give": lambda row: replace(row, witness=np.sign(row.witness).astype(np.float32)),
     "the style is": lambda row: replace(row, style="recover" if row.style == "varied" else "varied"),
