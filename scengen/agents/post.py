@@ -103,7 +103,7 @@ def _content(request: urllib.request.Request, timeout: float) -> bytes:
 class _NoRedirect(urllib.request.HTTPRedirectHandler):
     """A redirect is an answer like another one that is no success."""
 
-    def redirect_request(self, *_: Any) -> None:
+    def redirect_request(self, req: Any, fp: Any, code: int, msg: str, headers: Any, newurl: str) -> None:
         return None
 
 

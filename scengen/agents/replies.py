@@ -262,11 +262,11 @@ def _with_lists(plain: Mapping[str, Any], facts: Mapping[str, Fact]) -> dict[str
 
 
 def _entry(entry: Mapping[str, Any], facts: Mapping[str, Fact]) -> dict[str, Any]:
-    lists = {name: [entry[name]] for name in LISTS if isinstance(entry.get(name), str)}
+    lists: dict[str, Any] = {name: [entry[name]] for name in LISTS if isinstance(entry.get(name), str)}
     name, answer = entry.get("fact"), entry.get("answer")
     if isinstance(name, str) and name in facts and not facts[name].options:
         lists.pop("answer", None)
-        single = answer[0] if isinstance(answer, list) and len(answer) == 1 else answer
+        single: Any = answer[0] if isinstance(answer, list) and len(answer) == 1 else answer
         with suppress(ValueError, TypeError):
             lists["answer"] = single if isinstance(single, float | int) else float(single)
     return {**entry, **lists}
