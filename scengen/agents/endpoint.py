@@ -106,8 +106,10 @@ class Endpoint:
             Refusal: the endpoint refuses the request.
             ModelError: it stays busy, or gives no whole answer.
         """
-        last = ModelError("")
-        for tried in range(1, TRIES + 1):
+        wait, last = None, ModelError("")
+        for tried in range(TRIES):
+            if tried:
+                time.sleep(_wait(wait, tried))
             wait = None
             try:
                 answer = post(f"{self.url.rstrip('/')}/chat/completions", body, secret("key", self.key), self.timeout)
@@ -120,8 +122,6 @@ class Endpoint:
                 wait, last = error.wait, self._refusal(error)
             except Broken as error:
                 last = ModelError(self._hidden(f"{shown(self.url)} {error}"))
-            if tried < TRIES:
-                time.sleep(_wait(wait, tried))
         raise last
 
     def _refusal(self, error: Refusal) -> ModelError:

@@ -103,7 +103,7 @@ def _content(request: urllib.request.Request, timeout: float) -> bytes:
 class _NoRedirect(urllib.request.HTTPRedirectHandler):
     """A redirect counts as a failed request."""
 
-    def redirect_request(self, *_: Any, **__: Any) -> None:
+    def redirect_request(self, req: Any, fp: Any, code: int, msg: str, headers: Any, newurl: str) -> None:
         return None
 
 

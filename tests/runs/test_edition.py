@@ -50,6 +50,12 @@ def test_a_file_gives_the_same_edition_with_the_same_hash(edition):
     assert replace(edition, n=7).sha256 != edition.sha256
 
 
+def test_an_edition_of_an_unknown_level_is_refused(edition):
+    edition.path.write_text(edition.text.replace(f"level: {edition.level}", "level: qick"))
+    with pytest.raises(UnknownName, match=r"no level of .*mine.yaml named 'qick' \(did you mean 'quick'\?\)"):
+        Edition.read(str(edition.path))
+
+
 def test_rounding_of_another_machine_does_not_change_the_hash_of_a_scene_and_a_millimetre_does():
     text = '<mujoco><worldbody><body pos="0.1 -3e-18 2" name="b_1"/></worldbody></mujoco>'
     rounded = text.replace("0.1 -3e-18 2", "0.10000000000000002 0 2.0")
