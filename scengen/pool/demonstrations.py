@@ -189,6 +189,7 @@ def _check(manifest: DemonstrationManifest) -> None:
     for source, told in ((TELEOP, manifest.operator), (POLICY, manifest.policy)):
         demand((told is None) == (source not in config.styles), f"style {source} and its source go together")
         demand(source not in config.styles or len(config.styles) == 1, f"{source} stands beside other styles")
+    demand((manifest.failed is None) == (not config.keep), f"keep= and {FAILED} go together")
     if manifest.failed is not None:
         demand(manifest.failed.file == FAILED, f"failed names another file than {FAILED}")
     check_text("config.split", config.split, MAX_TEXT)
