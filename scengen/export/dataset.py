@@ -26,7 +26,7 @@ from ..pool.untrusted import READING_MEMORY
 from ..work.machine import memory_bounded
 from ..work.plain import open_plain
 from .lerobot import VIDEO_PATH
-from .schema import check_episode, check_info
+from .schema import check_episode, check_film, check_info
 
 TASK_VERSION = "scengen/task_version"
 """Column of the table of episodes with the version of the task. Recordings of earlier releases lack it."""
@@ -94,7 +94,7 @@ class Recording:
             if not found.episodes:
                 raise BadConfig("meta/episodes: there is no episode")
             for number, row in enumerate(found.episodes):
-                check_episode(number, row, found.cameras)
+                check_episode(number, row)
         except ScengenError as error:
             remedy = "name a folder that scengen record has written"
             raise PoolError(f"{folder} is not a recording of scengen: {error}; {remedy}") from None
@@ -202,6 +202,10 @@ class Recording:
         from av.error import FFmpegError
 
         about, key = episode.about, f"videos/{camera}"
+        try:
+            check_film(episode.number, about, camera)
+        except BadConfig as error:
+            raise PoolError(f"{self.folder}: {error}; record it again") from None
         chunk, file = (int(about[f"{key}/{name}"]) for name in ("chunk_index", "file_index"))
         path = self.folder / VIDEO_PATH.format(video_key=camera, chunk_index=chunk, file_index=file)
         first, last = (round(about[f"{key}/{name}"] * self.fps) for name in ("from_timestamp", "to_timestamp"))

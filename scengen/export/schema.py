@@ -65,10 +65,18 @@ def check_info(info: Mapping[str, Any]) -> Info:
     return found
 
 
-def check_episode(number: int, row: Mapping[str, Any], cameras: list[str]) -> None:
+def check_episode(number: int, row: Mapping[str, Any]) -> None:
     """Raise `BadConfig` unless a row of the table of episodes has the columns that are read, with their types."""
-    of_videos = {f"videos/{camera}/{name}": kind for camera in cameras for name, kind in VIDEO.items()}
-    for name, kind in {**EPISODE, **of_videos}.items():
+    _check_columns(number, row, EPISODE)
+
+
+def check_film(number: int, row: Mapping[str, Any], camera: str) -> None:
+    """Raise `BadConfig` unless a row of the table of episodes says where the pictures of a camera are."""
+    _check_columns(number, row, {f"videos/{camera}/{name}": kind for name, kind in VIDEO.items()})
+
+
+def _check_columns(number: int, row: Mapping[str, Any], columns: Mapping[str, type]) -> None:
+    for name, kind in columns.items():
         if name not in row:
             raise BadConfig(f"meta/episodes: the column {name} is missing")
         value = row[name]

@@ -265,6 +265,22 @@ def _stats(plain: Any) -> None:
     plain["robot0_joint_vel"]["mean"][0] += 1.0
 
 
+def _swapped(plain: Any, of: str = "robot0_eef_pos") -> None:
+    names = plain["features"][of]["names"]
+    names[0], names[1] = names[1], names[0]
+
+
+def _twice_as_fast(folder: Path) -> None:
+    _json("meta/info.json", lambda plain: plain.update(fps=50), folder)
+    rows("timestamp", lambda values: values / 2)(folder)
+
+
+def _accepted(folder: Path) -> None:
+    (folder / "curation").mkdir()
+    (folder / "curation/scores.csv").write_text("episode,score\n0,5\n")
+    (folder / "curation/decisions.csv").write_text("episode,verdict,who,why\n0,accept,me,fine\n")
+
+
 def _instruction(folder: Path) -> None:
     table = pq.read_table(folder / "meta/tasks.parquet")
     array = pa.array(["Wave."], pa.string())
@@ -287,6 +303,15 @@ RECORDINGS: dict[str, tuple[Callable[[Path], None], str]] = {
     "statistics of an episode": (told("stats/action/mean", [9.0] * 7), "STATS"),
     "number of episodes": (partial(_json, "meta/info.json", lambda p: p.update(total_episodes=9)), "INFO"),
     "number of rows": (partial(_json, "meta/info.json", lambda p: p.update(total_frames=9)), "INFO"),
+    "names": (partial(_json, "meta/info.json", _swapped), "INFO"),
+    "names of bodies": (
+        partial(_json, "meta/info.json", partial(_swapped, of="observation.environment_state")),
+        "INFO",
+    ),
+    "rate": (_twice_as_fast, "INFO"),
+    "robot": (partial(_json, "meta/info.json", lambda p: p.update(robot_type="panda_suction")), "INFO|not a recording"),
+    "paths": (partial(_json, "meta/info.json", lambda p: p.update(data_path="../{chunk_index}.parquet")), "INFO"),
+    "verdicts": (_accepted, "1 scores and 1 verdicts are those of people"),
     "id": (told("scengen/id", "0123456789ab"), "LABEL"),
     "code": (told("scengen/code", "T99"), "LABEL"),
     "split": (told("scengen/split", "wide_gaps"), "LABEL|DRAW"),

@@ -158,13 +158,15 @@ def test_a_description_of_other_types_names_file_field_and_value(folder, changed
         ("dataset_to_index", -1, "dataset_to_index of episode 0 is -1"),
         ("scengen/horizon", float("nan"), "scengen/horizon of episode 0 is nan"),
         (f"videos/{CAMERA}/from_timestamp", None, f"videos/{CAMERA}/from_timestamp of episode 0 is None"),
+        (f"videos/{CAMERA}/to_timestamp", float("inf"), f"videos/{CAMERA}/to_timestamp of episode 0 is inf"),
+        (f"videos/{CAMERA}/file_index", "", f"the column videos/{CAMERA}/file_index is missing"),
         ("scengen/id", "", "the column scengen/id is missing"),
     ],
 )
 def test_a_table_of_other_types_names_file_field_and_value(folder, name, value, says):
     row = {key: told for key, told in {**ABOUT, name: value}.items() if told != ""}
     pq.write_table(pa.Table.from_pylist([row]), folder / "meta/episodes/chunk-000/file-000.parquet")
-    refused(lambda: Recording.open(folder), f"meta/episodes: {says}")
+    refused(lambda: [[*r.frames(e, CAMERA)] for r in [Recording.open(folder)] for e in r.read()], f"episodes: {says}")
 
 
 @pytest.mark.parametrize("shape", [[-1], [10**9, 10**9], ["x"], "2"], ids=str)

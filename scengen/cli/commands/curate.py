@@ -34,6 +34,9 @@ def command(arguments: Arguments) -> int:
         say(f"claimed, and not checked: {', '.join(curated.claimed)}")
     else:
         remark("nothing was replayed: states, results and the table of episodes are claimed")
+    people = sum(report.scored_by == "person" for report in curated.reports)
+    if people or curated.decisions:
+        say(f"{people} scores and {len(curated.decisions)} verdicts are those of people, read from {folder}")
     if undecided := curated.undecided:
         say(
             f"{len(undecided)} flagged episodes wait for a decision: open {folder / 'index.html'}, and save {DECISIONS}"

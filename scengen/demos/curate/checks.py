@@ -83,7 +83,9 @@ def found(
 def fields(subject: Subject) -> Iterator[Finding]:
     """Whether every column of meta/info.json is there."""
     features = subject.recording.info["features"]
-    missing = [n for n, f in features.items() if f["dtype"] != "video" and n not in subject.episode.columns]
+    needed = [*proprioception(str(subject.recording.info["robot_type"])), STATE, "action", CONTROL_ACTIONS]
+    told = [*needed, *(n for n, f in features.items() if f["dtype"] != "video")]
+    missing = [name for name in dict.fromkeys(told) if name not in subject.episode.columns]
     if missing:
         yield found("MISSING_FIELD", f"columns of meta/info.json are missing: {', '.join(missing)}")
     if (length := subject.episode.about["length"]) != len(subject.episode):
@@ -161,7 +163,9 @@ def states(subject: Subject) -> Iterator[Finding]:
     """Whether the motion of the hands is possible, and happens while it is commanded."""
     period, moves, robot = 1.0 / subject.recording.fps, subject.moves, str(subject.recording.info["robot_type"])
     own = np.hstack([subject.column(name) for name in proprioception(robot)])
-    if len(wrong := np.flatnonzero(np.abs(own - subject.column(STATE)).max(axis=1) > ROUNDING)):
+    if own.shape != subject.column(STATE).shape:
+        yield found("STATE_MISMATCH", f"{STATE} has not the robot's own streams, {own.shape[1]} numbers")
+    elif len(wrong := np.flatnonzero(np.abs(own - subject.column(STATE)).max(axis=1) > ROUNDING)):
         yield found("STATE_MISMATCH", f"{STATE} is not the robot's own streams", wrong, rows=len(wrong))
     for number in range(subject.arms):
         arm = Names(number).arm

@@ -142,6 +142,8 @@ def _examined(
                 findings.append(found("DUPLICATE", f"it repeats episode {twin}", (), "error", episode=twin))
             if settings.replay:
                 task = compose.load_task(episode.task, search)
+                if (robot := recording.info["robot_type"]) != task.embodiment:
+                    findings.append(found("INFO", f"robot_type is {robot}, that of the task is {task.embodiment}"))
                 entries = recording.info["features"].get(ENVIRONMENT, {}).get("names") or ()
                 jobs.append(
                     Recorded.of(episode.number, task, episode.about, episode.columns, entries, size, films, frozen)

@@ -97,7 +97,7 @@ class Recorded:
     @property
     def bodies(self) -> list[str]:
         """Bodies of the environment state."""
-        return [n.removesuffix(FIRST) for n in self.entries if n.endswith(FIRST) and "_to_robot" not in n]
+        return bodies_in(self.entries)
 
     def readers(self, scenario: Scenario, text: str) -> dict[str, Callable[[World], NDArray[Any]]]:
         """Functions that read the streams from a world, of those that are known.
@@ -112,9 +112,19 @@ class Recorded:
             of_bodies = privileged(state, type(scenario), lambda: scenario.orientation)
             found |= {name: stream.read for name, stream in of_bodies.items()}
         if self.entries:
-            bodies = {body: f"{body}_vel_lin.x" in self.entries for body in self.bodies}
-            found[ENVIRONMENT] = ObjectState(bodies, len(hands(robot))).read
+            found[ENVIRONMENT] = state_of(self.entries, robot).read
         return {name: read for name, read in found.items() if name in self.streams}
+
+
+def bodies_in(entries: Sequence[str]) -> list[str]:
+    """Bodies of an environment state, by the names of its entries."""
+    return [n.removesuffix(FIRST) for n in entries if n.endswith(FIRST) and "_to_robot" not in n]
+
+
+def state_of(entries: Sequence[str], robot: str) -> ObjectState:
+    """The environment state with these entries."""
+    bodies = {body: f"{body}_vel_lin.x" in entries for body in bodies_in(entries)}
+    return ObjectState(bodies, len(hands(robot)))
 
 
 def difference(read: NDArray[np.float64], stored: NDArray[np.float32]) -> float:

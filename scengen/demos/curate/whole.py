@@ -1,17 +1,27 @@
 """Files beside the rows of a recording, compared with its rows: statistics, instructions, and the table of episodes."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...envs.object_state import BOX, MOTION, POSE
+from ...envs.observations import action_names, named, proprioception, streams_of
 from ...export.dataset import EpisodeData, Recording
 from ...export.floors import floors_of, with_floors
+from ...export.lerobot import DATA_PATH, VIDEO_PATH
+from ...export.native import FULL_RATE
+from ...export.recording import CONTROL_ACTIONS, STATE
 from ...export.stats import describe
+from ...export.streams import ENVIRONMENT, feature_of
 from .findings import Finding
+from .replays import state_of
+
+KINDS = {**POSE, **MOTION, **BOX}
+"""Names of the entries of streams of bodies, by the end of their name."""
 
 TOLERANCE = 1e-6
 """Largest difference of statistics, relative beyond 1."""
@@ -58,9 +68,13 @@ class Whole:
         info, stats = self.recording.info, self.recording.stats
         counts = {"total_episodes": len(self.recording.episodes), "total_frames": self.rows}
         counts["total_tasks"] = len(self.recording.tasks)
-        for name, here in counts.items():
+        split = {"train": f"0:{counts['total_episodes']}"}
+        made = {**counts, "splits": split, "data_path": DATA_PATH, "fps": FULL_RATE / self.periods}
+        made["video_path"] = VIDEO_PATH if self.recording.cameras else None
+        for name, here in made.items():
             if info.get(name) != here:
-                yield _finding("INFO", f"meta/info.json: {name} is {str(info.get(name))[:40]}, there are {here}")
+                yield _finding("INFO", f"meta/info.json: {name} is {str(info.get(name))[:40]}, not {here}")
+        yield from self._wrong_names()
         if self.rows != self.recording.total:
             yield _finding("EPISODE_TABLE", f"the table of episodes has {self.rows} rows of {self.recording.total}")
         if self.partial:
@@ -76,6 +90,27 @@ class Whole:
                 # one faulty episode does not keep the others out
                 severity = "warning" if name in self.faulty else "error"
                 yield Finding("STATS", severity, (), {}, f"meta/stats.json has other statistics of {name}")
+
+    @property
+    def periods(self) -> int:
+        """Number of control periods in a row."""
+        actions = self.columns.get(CONTROL_ACTIONS)
+        return actions[0].shape[1] if actions else round(FULL_RATE / self.recording.fps)
+
+    def _wrong_names(self) -> Iterator[Finding]:
+        """Whether the entries of columns have the names of what they hold: `train` chooses inputs by them."""
+        features, robot = self.recording.info["features"], str(self.recording.info["robot_type"])
+        own = streams_of(robot)
+        made: dict[str, Sequence[str] | None] = {n: feature_of(n, stream).names for n, stream in own.items()}
+        made |= {"action": action_names(robot), CONTROL_ACTIONS: ("period", "action")}
+        made[STATE] = named(own, proprioception(robot))
+        told = features.get(ENVIRONMENT, {}).get("names") or []
+        made[ENVIRONMENT] = state_of(told, robot).names
+        for name, feature in features.items():
+            kind = next((kind for kind in KINDS if name.endswith(f"_{kind}")), None)
+            entries = made.get(name) or (kind and [f"{name}.{entry}" for entry in KINDS[kind]])
+            if entries and feature.get("names") != list(entries):
+                yield _finding("INFO", f"meta/info.json: the entries of {name} have other names")
 
     @property
     def claimed(self) -> list[str]:
