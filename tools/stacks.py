@@ -5,7 +5,7 @@
 
 Each stack has an environment below build/stacks, into which pip resolves scengen without overrides. robosuite, from
 which the robot's files are read, is installed without its requirements. A stack whose Python is missing is reported as
-not tried. Results are stored in records/stacks.
+not tested. Results are stored in records/stacks.
 """
 
 import json

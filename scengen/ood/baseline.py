@@ -33,7 +33,7 @@ COUNTS = ("twins", "training", "here", "both")
 
 @dataclass(frozen=True)
 class Baseline:
-    """Success of one baseline on an axis. Only twins count that the oracle solves in both arms."""
+    """Success of one baseline on an axis. A pair counts only if the oracle solves both scenarios."""
 
     name: str
     own: float
