@@ -108,7 +108,7 @@ def _rows(name: str) -> list[list[str]]:
 
 
 def _verdicts(rows: Sequence[Sequence[str]]) -> str:
-    """How many axes have each kind of verdict, in words."""
+    """How many axes have each kind of verdict, as text."""
     words = [row[COLUMNS.index("verdict")] for row in rows]
     broken, solved, missing = (sum(word.startswith(start) for word in words) for start in ("breaks", "solved", "not "))
     return (

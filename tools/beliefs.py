@@ -56,7 +56,7 @@ def wanted(names: list[str], n: int, fresh: bool) -> Iterator[tuple[Task, str]]:
 
 
 def measure(task: Task, axis: str, n: int, workers: int, fresh: bool) -> str:
-    """Play the planners on an axis and store the row. Returns the result in words."""
+    """Play the planners on an axis and store the row. Returns the result as text."""
     folder = MADE / f"{task.name}-{axis}" / f"v{task.version}-{measuring.draws_of(task, axis)}"
     if fresh:
         (folder / "beliefs.jsonl").unlink(missing_ok=True)

@@ -141,7 +141,7 @@ def _table(rows: Sequence[Sequence[str]]) -> str:
 
 
 def sentence() -> str:
-    """Which predictor is the best, in words."""
+    """Which predictor is the best, as text."""
     told = ", otherwise ".join(map(_spelled, ranking()))
     if told:
         return f"Where no learner was tried, the best predictor that was ([figures](predictors.md)) stands in: {told}."
@@ -158,7 +158,7 @@ def cell(task: str, found: Mapping[str, Baseline]) -> str:
 
 
 def _spelled(name: str) -> str:
-    """Name of a predictor in words."""
+    """Name of a predictor as text."""
     return name.replace("_", " ")
 
 

@@ -49,7 +49,7 @@ def openings(pool: Pool, page: Page) -> list[float]:
 
 
 def driven(pool: Pool, page: Page, folder: Path) -> tuple[float, str]:
-    """Pictures per second while the robot moves, and the times of the control loop in words."""
+    """Pictures per second while the robot moves, and the times of the control loop as text."""
     settings = TeleopSettings(device="browser", n=1, to=str(folder))
     driver = Driver(source_of_pool(pool, (), None), settings)
     with closing(Studio(Content(None, driver=driver), HOST, 0)) as studio:

@@ -68,7 +68,7 @@ class Reply:
     """What a model answered."""
 
     text: str
-    """Text of the answer; may be empty beside calls."""
+    """Text of the answer; may be empty if there are calls."""
     calls: tuple[Call, ...] = ()
     """Calls of tools."""
     tokens_in: int = 0
@@ -90,7 +90,7 @@ class Model(Protocol):
         Args:
             turns: the conversation, oldest first.
             tools: functions of which the answer must call one; none if it must be JSON.
-            schema: JSON schema of the answer; empty for free text and beside tools.
+            schema: JSON schema of the answer; empty for free text and with tools.
             temperature: temperature of sampling.
             seed: seed of sampling, for models that have one.
         """
@@ -191,7 +191,7 @@ def _content(turn: Turn) -> str | list[dict[str, Any]]:
 
 
 def _wait(asked: str | None, tried: int) -> float:
-    """Wait before the next try [s]: what the server asks for, else 1, 2, 4 s and so on."""
+    """Wait before the next try [s]: the time that the server requests, else 1, 2, 4 s and so on."""
     seconds = float(asked) if asked and asked.replace(".", "", 1).isdigit() else 2.0 ** (tried - 1)
     return min(seconds, LONGEST_WAIT)
 

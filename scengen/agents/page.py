@@ -22,7 +22,7 @@ SHOWN = 200
 def write_page(
     folder: Path, results: Sequence[Mapping[str, Any]], model: str, priors: Mapping[str, Mapping[str, Prior]]
 ) -> Path:
-    """Write `report.html` into the folder of a run; pictures stay beside it. Returns its path."""
+    """Write `report.html` into the folder of a run; pictures stay next to it. Returns its path."""
     calls = [json.loads(line) for line in (folder / CALLS).read_text().splitlines()[1:]]
     by_exam: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
     for call in calls:

@@ -82,7 +82,7 @@ class Primitive:
     name: str
     """Name of the primitive."""
     told: str
-    """The call in words, for the memory of the model."""
+    """The call as text, for the memory of the model."""
     plan: Callable[[], Plan]
     """Function that starts its plan of the whole robot."""
 

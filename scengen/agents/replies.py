@@ -1,4 +1,4 @@
-"""Replies under their JSON schemas: what stage 1 and stage 2 ask for, and what is wrong with the form of a reply."""
+"""Replies under their JSON schemas: the required form of stages 1 and 2, and the faults of a reply."""
 
 import json
 import re
@@ -28,7 +28,7 @@ class Seen:
     frame: str
     """Name of the frame."""
     seen: str
-    """Description in words."""
+    """Description as text."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Why:
     constraint: str
     """Id of the question of stage 1 whose answer is the reason."""
     reason: str
-    """Reason in words."""
+    """Reason as text."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Step:
     subgoal: str
     """Name in the vocabulary, or `other`."""
     outcome: str
-    """Physical outcome in words."""
+    """Physical outcome as text."""
     objects: list[str]
     """Names of the objects."""
     before: list[str]

@@ -1,4 +1,4 @@
-"""Tables of a run: shares of right answers by task and category, ID beside OOD, with intervals by scenario."""
+"""Tables of a run: shares of right answers by task and category, ID next to OOD, with intervals by scenario."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -104,7 +104,7 @@ def executed_lines(results: Sequence[Mapping[str, Any]]) -> list[TableLine]:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Audits of plans beside their outcomes."""
+    """Audits of plans next to their outcomes."""
 
     right: int
     """Number of plans that are right and were carried out."""
@@ -113,7 +113,7 @@ class Agreement:
     wrong: int
     """Number of plans that are wrong and were carried out."""
     wrong_reached: int
-    """Number of them that reached the goal all the same."""
+    """Number of them that still reached the goal."""
     no_moves: tuple[str, ...]
     """Tasks that state no moves for their sub-goals; their plans are not carried out."""
 

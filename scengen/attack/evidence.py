@@ -61,7 +61,7 @@ class Hit:
     raw: bool
     """Whether its actions reached the controller without the teleoperation filter."""
     plan: str
-    """Description of the attempt, in words."""
+    """Description of the attempt, as text."""
     seconds: float
     """Time at which the goal was reached [s]."""
     digest: str

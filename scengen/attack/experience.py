@@ -1,4 +1,4 @@
-"""What a policy may know of a task from training: solutions by heart, and how long waits last."""
+"""What a policy may know of a task from training: memorised solutions, and the durations of waits."""
 
 from collections.abc import Collection, Iterator
 from contextlib import suppress

@@ -28,7 +28,7 @@ COMPLETING = ("--completion", "--complete")
 """Options that shells use."""
 GRACE = 1.5
 """Time that an interrupted command has to clean up before it is ended [s]."""
-OUT_OF_MEMORY = "out of memory; ask for less at once, use fewer workers, or raise the limit of memory (ulimit -v)"
+OUT_OF_MEMORY = "out of memory; process less at once, use fewer workers, or raise the limit of memory (ulimit -v)"
 """Message for a command that has no memory left."""
 NO_MEMORY = "Could not allocate memory"
 """Words with which MuJoCo reports a lack of memory, in exceptions of multiple types."""

@@ -76,7 +76,7 @@ class Judge:
     oracle: bool
     """Whether the oracle plays again, too."""
     other_version: str = ""
-    """Versions in words if the demonstrations were made on another one, see `Task.other_version`."""
+    """Versions as text if the demonstrations were made on another one, see `Task.other_version`."""
 
     def __call__(self, row: DemonstrationRow) -> Examined:
         try:

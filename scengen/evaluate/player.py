@@ -46,8 +46,8 @@ def phase(world: World) -> str:
 
 
 class PolicyPlayer:
-    """Plays batches of rollouts: those of a batch at once, each in a slot of a vector environment, by a policy of its
-    own. It keeps the environment and the policies as long as the task stays the same."""
+    """Plays batches of rollouts: those of a batch at once, each in a slot of a vector environment, by its own policy.
+    It keeps the environment and the policies as long as the task stays the same."""
 
     def __init__(
         self,

@@ -76,7 +76,7 @@ class Coordinate:
 
 
 Contacts = Literal["same", "none", "all"]
-"""Which of the contacts that the rules ask for there are: those of the state, none, or all."""
+"""Which of the contacts that the rules query exist: those of the state, none, or all."""
 
 
 @dataclass(frozen=True)

@@ -252,7 +252,7 @@ def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, 
     """Arrays of known shapes. The shape in a header is compared before memory is taken for it.
 
     Raises:
-        Broken: an array is missing, or another one than expected, or the file is not an archive.
+        Broken: an array is missing or differs from the expected one, or the file is not an archive.
     """
     try:
         with zipfile.ZipFile(path) as archive:

@@ -22,7 +22,7 @@ KINDS = {**MEMORIES, "belief": BELIEF, "learner": LEARNERS}
 MIN_OWN_SUCCESS = 0.9
 """Minimum share of its own scenarios that a baseline has to solve again. Below it, the baseline is too weak."""
 MIN_CONTROL_SUCCESS = 0.3
-"""Minimum share of its control arm that a baseline has to solve. Below it, the baseline is too weak."""
+"""Minimum share of its control scenarios that a baseline has to solve. Below it, the baseline is too weak."""
 SOLVED_SHARE = 0.5
 """An axis counts as solved by a baseline if the interval of its success lies above this share."""
 INCONCLUSIVE = "inconclusive"
@@ -41,13 +41,13 @@ class Baseline:
     control: str
     """Kind of the control: `moved within training` or `held-out training`."""
     training: Rate | None
-    """Success rate in the control arm; None if there was no twin to try."""
+    """Success rate in the control condition; None if there was no twin to try."""
     here: Rate | None
     """Success rate in the OOD twins."""
     excess: Difference | None
     """Difference `training` minus `here`, paired by twins."""
     both: int = 0
-    """Number of twins that are solved in both arms."""
+    """Number of twins that are solved in both conditions."""
 
     @classmethod
     def of(cls, name: str, control: str, arms: Sequence[tuple[bool, bool]], own: float = 1.0) -> Self:

@@ -186,7 +186,7 @@ def _check(manifest: DemonstrationManifest) -> None:
     demand(manifest.operator is None or manifest.policy is None, "an operator and a policy")
     for source, stated in ((TELEOP, manifest.operator), (POLICY, manifest.policy)):
         demand((stated is None) == (source not in config.styles), f"style {source} and its source go together")
-        demand(source not in config.styles or len(config.styles) == 1, f"{source} stands beside other styles")
+        demand(source not in config.styles or len(config.styles) == 1, f"{source} is combined with other styles")
     if manifest.failed is not None:
         demand(manifest.failed.file == FAILED, f"failed names a different file than {FAILED}")
     check_text("config.split", config.split, MAX_TEXT)

@@ -37,7 +37,7 @@ class FileEntry:
     """What a manifest says of a file with rows."""
 
     file: str
-    """Name of the file, which lies beside the manifest."""
+    """Name of the file, which is in the folder of the manifest."""
     rows: int
     bytes: int
     sha256: str
@@ -66,7 +66,7 @@ def why_damaged(folder: Path, entry: FileEntry, identities: dict[Path, Identity]
     """What is wrong with a file; empty if nothing is.
 
     Args:
-        entry: what the manifest beside the file says of it.
+        entry: the file's entry in the manifest of its folder.
         identities: identities of the files that were compared so far, to which this one is added.
     """
     path = folder / entry.file
@@ -132,7 +132,7 @@ _NOT_PLAIN = "is not a plain file"
 
 
 def read_json_file(path: Path) -> Any:
-    """Content of a JSON file beside the shards: a manifest, or an index.
+    """Content of a JSON file in the folder of the shards: a manifest, or an index.
 
     Raises:
         ValueError: it is not a plain file, too large, or not strict JSON.

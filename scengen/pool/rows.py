@@ -185,7 +185,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         return self.at(self.directory.find(name, self.name_at, str(self.folder)))
 
     def _rows_of_file(self, entry: FileEntry | None) -> Iterator[AnyRow]:
-        """The rows of a file beside the shards; none if there is no such file."""
+        """The rows of a file in the folder of the shards; none if there is no such file."""
         return map(self._row, Reader([] if entry is None else [self._shard(entry)]).rows(self._names()))
 
     def _names(self, witness: bool = True) -> tuple[str, ...]:

@@ -15,8 +15,8 @@ from ..work.targets import refused
 from .journal import Journal, Record
 
 MAX_LOST = 100
-"""Number of attempts in a row that crash or reach a limit, at which a run ends: of a sound family hardly one in a
-hundred does."""
+"""Number of attempts in a row that crash or reach a limit, at which a run ends: fewer than one in a hundred attempts of
+a sound family does."""
 
 Progress = Callable[[int, int, Mapping[str, int], Mapping[str, int]], None]
 """Called with the numbers of successes and of finished attempts, and the numbers of attempts by verdict and of

@@ -129,7 +129,7 @@ class Driver:
         self.session: Session | None = None
         """The latest take; None before the first one."""
         self.told: list[str] = []
-        """Results of the takes, in words."""
+        """Results of the takes, as text."""
         self.turned = turns_pictures(source.task.family)
         """Whether a policy may see the scenarios turned or mirrored; then pages show a picture of what it sees."""
         self._eye: Eye | None = None
@@ -203,7 +203,7 @@ class Shown:
     line: StateLine
     poses: Poses
     told: str
-    """Result of the latest take, in words."""
+    """Result of the latest take, as text."""
     picture: Picture | None
     """What a policy sees, if its pictures may be turned."""
 

@@ -79,7 +79,7 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
     about = {"model": settings.model, "task_versions": versions, "stages": printed}
     write_json(str(folder / f"table-{settings.stage}.json"), about)
     page = write_page(folder, found.results, settings.model, found.priors)
-    say(f"{found.calls} new calls, {found.tokens} tokens; wrote {page} and tables beside it")
+    say(f"{found.calls} new calls, {found.tokens} tokens; wrote {page} and tables next to it")
     if found.stopped:
         remark(f"stopped early: {found.stopped}")
         return FAILED

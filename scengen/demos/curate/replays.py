@@ -160,7 +160,7 @@ def _replayed(recorded: Recorded) -> Replayed:
 
 
 class _Films:
-    """The films of an episode beside pictures of its replay. Without OpenGL none is compared."""
+    """The films of an episode compared with pictures of its replay. Without OpenGL none is compared."""
 
     def __init__(self, recorded: Recorded, scenario: Scenario, world: World, stack: ExitStack):
         self._held, self._camera = scenario.orientation, None

@@ -47,7 +47,7 @@ class Options:
     limits: Limits | None = LIMITS
     """Limits of one scenario; None to work in this process."""
     adversary: Adversary | None = None
-    """The adversary at level full, if the certificates ask for an attack; see `certify.certify`."""
+    """The adversary at level full, if the certificates require an attack; see `certify.certify`."""
 
 
 def verify(

@@ -53,7 +53,7 @@ def simulate(
     level: str,
     adversary: Adversary | None = None,
 ) -> Simulated:
-    """Simulate what a level asks for, until a fault is found.
+    """Run the simulations of a level until a fault is found.
 
     Args:
         row: a row whose labels, names and settings are right.
