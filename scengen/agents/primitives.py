@@ -32,7 +32,7 @@ GRIP_SECONDS = 0.8
 MAX_TICKS = 1000
 """Largest number of control periods of one primitive, 10 s."""
 LOWEST = TABLE_TOP - 0.30
-"""Lowest target of the hand [m]: below the table's top, beside it."""
+"""Lowest target of the hand [m]: below the table's top, at its side."""
 DONE = "Done"
 
 

@@ -20,7 +20,7 @@ from .player import Player
 from .scene import FAULTS, SceneView, filmed, one_line
 
 TWIN_OFFSET: Vec3 = np.array([0.0, 1.4, 0.0])
-"""Position of the training twin beside the scenario [m]: the table is 0.8 m wide."""
+"""Position of the training twin, at the side of the scenario [m]: the table is 0.8 m wide."""
 LABEL_OFFSET: Vec3 = np.array([0.0, 1.4, 1.3])
 """Position of the label of the training twin [m], above its table."""
 CAMERA: Vec3 = np.array([0.9, -0.75, 1.45])
