@@ -11,6 +11,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from commit_subject import faults
 
 ROOT = Path(__file__).parents[1]
 MODULES = sorted((ROOT / "scengen").rglob("*.py"))
@@ -172,3 +173,23 @@ def test_the_checks_see_what_they_are_for():
     tree = ast.parse('"""Whoever reads this."""\nA = 1\nLOW, HIGH = 0, 1\nSPEED = 2\n"""When it starts to."""\n')
     assert fragments(tree) == ["SPEED: When it starts to."] and nameless(tree) == ["A", "LOW, HIGH"]
     assert [bool(HEADLESS.search(text)) for text in docstrings(tree)] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("subject", "says"),
+    [
+        ("Add a hook that checks subjects", ""),
+        ("Process pools in one pass\n\nA body of any length.", ""),
+        ("Speed up the control loop", ""),
+        ("Merge branch 'names' of another repository into the branch that is to be released next", ""),
+        ("Added a hook", "imperative"),
+        ("Fixes a hook", "imperative"),
+        ("The hook works", "imperative"),
+        ("add a hook", "capital"),
+        ("Add a hook.", "full stop"),
+        ("Add a hook " * 7, "77 characters"),
+    ],
+)
+def test_subjects_of_commits_are_short_and_imperative(subject, says):
+    found = "; ".join(faults(subject))
+    assert says in found and bool(says) == bool(found)
