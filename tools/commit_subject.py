@@ -1,4 +1,4 @@
-"""Check the subject of a commit message: imperative and at most 72 characters. `python tools/commit_subject.py FILE`."""
+"""Check the subject of a commit message: imperative, at most 72 characters: `python tools/commit_subject.py FILE`."""
 
 import re
 import sys
