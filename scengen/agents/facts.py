@@ -238,7 +238,7 @@ def _options(question: Question) -> tuple[str, ...]:
 
 
 def _recorded(question: Question, shortcuts: Mapping[str, Any]) -> str:
-    """How a certificate says that a shortcut failed, with the filter of the oracles.
+    """Text by which a certificate reports a failed shortcut, with the filter of the oracles.
 
     Raises:
         BadConfig: the certificate does not record the shortcut.

@@ -65,14 +65,14 @@ class Call:
 
 @dataclass(frozen=True)
 class Reply:
-    """What a model answered."""
+    """Answer of a model."""
 
     text: str
     """Text of the answer; may be empty if there are calls."""
     calls: tuple[Call, ...] = ()
     """Calls of tools."""
     tokens_in: int = 0
-    """Number of tokens of the prompt, as the model counts them; 0 if it does not say."""
+    """Number of tokens of the prompt, as the model counts them; 0 if it does not report it."""
     tokens_out: int = 0
     """Number of tokens of the answer, reasoning included."""
     seconds: float = field(default=0.0, compare=False)

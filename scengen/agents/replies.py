@@ -23,7 +23,7 @@ class FormatError(ScengenError):
 
 @dataclass(frozen=True)
 class Seen:
-    """What one frame shows."""
+    """Description of one frame."""
 
     frame: str
     """Name of the frame."""
@@ -78,7 +78,7 @@ class Understanding:
 
 @dataclass(frozen=True)
 class Why:
-    """Why the simplest action fails."""
+    """Reason why the simplest action fails."""
 
     constraint: str
     """Id of the question of stage 1 whose answer is the reason."""

@@ -1,4 +1,4 @@
-"""What a model gets to know of a scene: words, frames and readings, and nothing that names the scenario."""
+"""Description of a scene for a model: words, frames and readings, and nothing that names the scenario."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ HANDS = {JAW: f"a parallel jaw that opens {1000 * OPENING:.0f} mm wide", SUCTION
 
 @dataclass(frozen=True)
 class View:
-    """What was seen and read of a scene: the slots of a prompt that depend on the scenario."""
+    """Pictures and readings of a scene: the slots of a prompt that depend on the scenario."""
 
     frames: Mapping[str, bytes]
     """JPEG pictures by name, such as `agentview at 0.0 s`; none for a model without pictures."""

@@ -29,7 +29,8 @@ def lines(results: Sequence[Mapping[str, Any]], stage: int) -> list[TableLine]:
 
 @dataclass(frozen=True)
 class SightLine:
-    """How far the answers of stage 1 are better than the best answers without a look: 0 as good, 1 all right.
+    """Measure of how much the answers of stage 1 are better than the best answers without a look: 0 as good, 1 all
+    right.
 
     The measure is Cohen's kappa with the best fixed answers of training in place of chance: (share of right answers -
     prior) / (1 - prior), over the questions whose prior is below 1.
@@ -175,7 +176,7 @@ def plan_errors(results: Sequence[Mapping[str, Any]]) -> Counter[str]:
 
 
 def lost_in_twins(results: Sequence[Mapping[str, Any]], stage: int) -> tuple[int, int]:
-    """How often training is understood and the OOD twin is not.
+    """Share of answers that are right in training and wrong in the OOD twin.
 
     Returns:
         Number of answers that are right in training and not in the twin of the same index, and number of answers that

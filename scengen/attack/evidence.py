@@ -46,7 +46,7 @@ passes with a probability of 13 %."""
 
 
 def spelled(raw: bool) -> str:
-    """How actions reach the controller, in a word."""
+    """Path of actions to the controller, in one word."""
     return "raw" if raw else "filtered"
 
 

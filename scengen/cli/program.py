@@ -201,7 +201,7 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
 
 
 def _unknown(verb: str, arguments: Sequence[str]) -> BadConfig:
-    """Why the beginning of a command line names no command."""
+    """Reason why the beginning of a command line names no command."""
     if verb in FORMS:
         given = next((cut(repr(word)) for word in arguments if not word.startswith("-")), "nothing")
         forms = FORMS[verb]

@@ -62,7 +62,7 @@ MAX_ACTION_REPEAT = 100
 
 @dataclass(frozen=True)
 class ObservationSettings:
-    """What an environment observes: its streams, its cameras, and the size of all pictures."""
+    """Observations of an environment: its streams, its cameras, and the size of all pictures."""
 
     streams: Mapping[str, Stream]
     """Streams to read, by name, in the requested order."""

@@ -119,7 +119,7 @@ class PolicyPlayer:
         return [None] * len(rollouts) if found is None else [*found]
 
     def _tried(self, rollouts: "Sequence[_Rollout]", part: str, call: Callable[[], A]) -> A | None:
-        """What a part of a policy returns; None if it crashes, which ends its rollouts."""
+        """Return value of a part of a policy; None if it crashes, which ends its rollouts."""
         try:
             with policy_errors(self.settings.name, part):
                 return call()
@@ -192,7 +192,7 @@ class _Rollout:
     env: PoolEnv
     policy: Policy
     record: dict[str, Any] = field(default_factory=dict)
-    """What is known at its end; empty before."""
+    """Data that are known only at the end of the episode; empty before."""
 
     @property
     def seed(self) -> int:

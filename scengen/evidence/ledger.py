@@ -113,7 +113,7 @@ def write(row: Evidence) -> None:
 
 
 def not_measured(task: str) -> str:
-    """What a page says where there is no row about today's version of a task."""
+    """Text of a page where the present version of a task has no row."""
     return f"not measured on version {task_files.version(task)}"
 
 

@@ -1,7 +1,7 @@
 """Epochs of a training, each of which is kept on disk: a training that was interrupted continues after the last one.
 
 The perceptrons are scikit-learn's `MLPRegressor`. An epoch is one `fit` of each that continues from the weights of the
-epoch before, with fresh noise and its own learning rate. All random numbers depend on the seed, the member and the
+previous epoch, with fresh noise and its own learning rate. All random numbers depend on the seed, the member and the
 epoch, and the arithmetic runs on one core: the same data give the same weights, with or without interruptions.
 
 One pass of one perceptron over 48 300 rows of 176 inputs took scikit-learn 1.0 to 1.5 s of processor time, and the same

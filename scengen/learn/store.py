@@ -61,7 +61,7 @@ class Broken(ValueError):
 
 @dataclass(frozen=True)
 class PolicySettings:
-    """What a folder says of its policy."""
+    """Description of a policy in its folder."""
 
     kind: str
     """Name of the policy, one of `models.KINDS`."""

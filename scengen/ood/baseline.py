@@ -1,4 +1,4 @@
-"""What is played on an axis with what was right in training, and the verdict that follows from it."""
+"""Baselines that worked in training, played on an axis, and the resulting verdict."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ LEARNERS = ("bc", "mip", "knn")
 MEMORIES = {"motion memory": MOTION, "object-centric memory": OBJECT_CENTRIC}
 """Kinds of memory, from the weaker to the stronger."""
 KINDS = {**MEMORIES, "belief": BELIEF, "learner": LEARNERS}
-"""What an axis can break, each kind with its baselines."""
+"""Kinds of baselines that an axis can break, each with its members."""
 MIN_OWN_SUCCESS = 0.9
 """Minimum share of its own scenarios that a baseline has to solve again. Below it, the baseline is too weak."""
 MIN_CONTROL_SUCCESS = 0.3
@@ -112,7 +112,8 @@ class Baseline:
 
 
 def verdict(baselines: Iterable[Baseline]) -> str:
-    """What an axis breaks: the strongest kind of memory, belief, learner, as in `breaks object-centric memory, belief`.
+    """Kinds of baselines that an axis breaks: the strongest kind of memory, belief, learner, as in `breaks
+    object-centric memory, belief`.
 
     If it breaks nothing, `solved by` the first kind that solves most of it, as `solved by motion memory`; otherwise
     `INCONCLUSIVE`. A learner that solves the axis contradicts no verdict: it can interpolate where a memory cannot.

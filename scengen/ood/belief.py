@@ -117,7 +117,7 @@ def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
 
 
 def _play(task: Task, scenario: Scenario, planner: Scenario) -> str | None:
-    """Why a planner fails in a scenario; None if it solves it."""
+    """Reason why a planner fails in a scenario; None if it solves it."""
     if planner == scenario:
         return None  # its beliefs are right, so it is the oracle, which has solved the scenario
     rollout = run(

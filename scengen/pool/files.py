@@ -34,7 +34,7 @@ def sha256_of_opened(file: BufferedReader) -> str:
 
 @dataclass(frozen=True)
 class FileEntry:
-    """What a manifest says of a file with rows."""
+    """Entry of a manifest for a file with rows."""
 
     file: str
     """Name of the file, which is in the folder of the manifest."""
@@ -63,7 +63,7 @@ class Identity:
 
 
 def why_damaged(folder: Path, entry: FileEntry, identities: dict[Path, Identity]) -> str:
-    """What is wrong with a file; empty if nothing is.
+    """Fault of a file; empty if nothing is.
 
     Args:
         entry: the file's entry in the manifest of its folder.
@@ -96,7 +96,7 @@ def replace_file(path: Path, content: bytes) -> None:
 
 
 def why_not_plain(path: Path) -> str:
-    """Why a file of a pool is not opened; empty if it is. Links, pipes and devices are not."""
+    """Reason why a file of a pool is not opened; empty if it is. Links, pipes and devices are not."""
     try:
         mode = os.lstat(path).st_mode
     except OSError:
@@ -126,7 +126,7 @@ def open_plain(path: Path) -> BufferedReader:
 
 
 _FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
-"""How files are opened. Each platform has some of these flags; Windows follows links."""
+"""Flags with which files are opened. Each platform has some of these flags; Windows follows links."""
 _MISSING = "is missing"
 _NOT_PLAIN = "is not a plain file"
 

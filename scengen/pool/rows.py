@@ -20,7 +20,7 @@ from .shards import Shard
 
 
 class StoredManifest(Protocol):
-    """What every manifest has."""
+    """Entries of every manifest."""
 
     @property
     def config(self) -> Any:
@@ -54,7 +54,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
     MANIFEST: ClassVar[str]
     """Name of the manifest's file."""
     REMEDY: ClassVar[str]
-    """How the rows are made again, for errors."""
+    """Command that makes the rows again, for errors."""
 
     def __len__(self) -> int:
         """Number of rows, by the manifest."""
@@ -207,5 +207,5 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         return Shard(self.folder / entry.file, entry.rows, self._identities, layout(self.ROW))
 
     def __getstate__(self) -> dict[str, Any]:
-        """What goes to another process: where the rows are, and not what was read of them."""
+        """State for another process: where the rows are, and not what was read of them."""
         return {f.name: getattr(self, f.name) for f in fields(self)}

@@ -35,7 +35,7 @@ class Attempt(Protocol):
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a run is to make, and how far it may go for it."""
+    """Target of a run, and the limit of its attempts."""
 
     verdict: str
     """Verdict of a success."""

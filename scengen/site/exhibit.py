@@ -1,4 +1,4 @@
-"""What the site shows of a task: films, pictures and pairs of twins, made once and stored with a description."""
+"""Content of the site about a task: films, pictures and pairs of twins, made once and stored with a description."""
 
 import hashlib
 import json
@@ -110,7 +110,7 @@ class Ending:
 
 @dataclass(frozen=True)
 class Exhibit:
-    """What was made for a task."""
+    """Files that were made for a task."""
 
     key: str
     """Hash of what it was made from."""
@@ -273,7 +273,7 @@ def _drawn(task: Task, splits: Sequence[str]) -> tuple[int, list[Draw]]:
 
 
 def _endings(row: PoolRow, check: str) -> list[Ending]:
-    """How the plans that must fail have failed, by the certificate, which may be untrusted."""
+    """Failures of the plans that must fail, by the certificate, which may be untrusted."""
     found = []
     for numbers in (each.numbers for each in row.certificate.checks if each.name == check):
         for plan, outcomes in numbers.items():

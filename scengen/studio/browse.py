@@ -193,7 +193,7 @@ class Browser:
             self._place.value = pool.directory.find(text, pool.name_at, str(pool.folder)) + 1
 
     def _description(self, row: PoolRow, best: str) -> str:
-        """What the scenario is, as text and units; texts of the pool are escaped."""
+        """Description of the scenario with units; texts of the pool are escaped."""
         task, sampler = self.task, self.pool.manifest.config.sampler
         words = [f"task={row.task}", f"split={row.split}", f"seed={row.seed}", f"index={row.index}"]
         if sampler != "iid":

@@ -205,11 +205,11 @@ class Shown:
     told: str
     """Result of the latest take, as text."""
     picture: Picture | None
-    """What a policy sees, if its pictures may be turned."""
+    """Picture that a policy sees, if its pictures may be turned."""
 
 
 class DrivePage:
-    """What one browser shows of the takes. A separate thread sends, so that the control loop does not wait."""
+    """Page of the takes in one browser. A separate thread sends, so that the control loop does not wait."""
 
     def __init__(self, client: viser.ClientHandle, driver: Driver):
         self._client, self._view = client, SceneView(client.scene, "/drive")

@@ -216,8 +216,8 @@ class DominoSelect(Scenario):
         yield within_reach("a first tile", *(start + self.starter.height * UP for start in starts))
 
     def features(self) -> Mapping[str, float]:
-        """How far tiles lean when they strike, the space between chains, by how much chains fail (0: none does), and
-        how far to push [rad].
+        """Ratios that decide at which angle tiles strike, the space between chains, how much chains fail (0: none
+        does), and tipping angles [rad].
         """
         return {
             "gap_over_height": self.gap / self.tile.height,

@@ -87,7 +87,7 @@ def _rounded(word: str) -> str:
 
 
 def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> str:
-    """How the scene of a pool differs from the rebuilt one, as text; empty if it does not.
+    """Difference between the scene of a pool and the rebuilt one, as text; empty if it does not.
 
     Args:
         exact: whether every byte must be equal, as on a machine with the same rounding. Otherwise every element and

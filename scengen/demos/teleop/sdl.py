@@ -54,7 +54,7 @@ LINE_HEIGHT = 40
 
 
 class _Sdl:
-    """What gamepad and keyboard share: SDL's queue of events, which belongs to the process."""
+    """Base of gamepad and keyboard: SDL's queue of events, which belongs to the process."""
 
     paced = True
 

@@ -100,7 +100,7 @@ class DiscoverSettings:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Findings of a search, and the trials that it spent."""
+    """Findings of a search, and the number of its trials."""
 
     findings: list[Finding]
     """Findings that were confirmed, the smallest p value first."""

@@ -96,7 +96,7 @@ class PlannedTrial:
     stage: str
     """Stage of the search that requests the trial."""
     where: Point | RegionBox
-    """Point that is tried; the box if it is to be confirmed."""
+    """Point of the trial, or the box to be confirmed."""
     twin: int
     """Number of the twin whose memory is played."""
 

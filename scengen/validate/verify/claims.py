@@ -40,7 +40,7 @@ class OfCode(str):
 
 @dataclass(frozen=True)
 class Claims:
-    """What a pool says of all its rows."""
+    """Claims of a pool about all its rows."""
 
     task: Task
     """The task as the manifest describes it, with the installed family."""

@@ -32,7 +32,7 @@ MAX_FAULTS = 100
 
 @dataclass(frozen=True)
 class Options:
-    """How a pool is verified."""
+    """Settings of the verification of a pool."""
 
     level: str = "recheck"
     """One of `recheck.LEVELS`."""

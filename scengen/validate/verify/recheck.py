@@ -108,7 +108,7 @@ def fails_again(
 
 
 def certified_here(row: PoolRow, claims: Claims, adversary: Adversary | None) -> str:
-    """What the installed version of the task makes of a scenario that was certified against another one.
+    """Result of a scenario that was certified against another version of its task, under the installed one.
 
     Args:
         adversary: see `certify`.
