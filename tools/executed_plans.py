@@ -73,7 +73,7 @@ def main(*arguments: str) -> None:
                     row = measuring.keep(task, ID, "plan", 1, value, made_with)
                     if value["success"] != (kind in (RIGHT, OPTIONAL)):
                         print(f"  {name}@{index} {kind}: {' '.join(names)}: {value['reason'] or 'success'}", flush=True)
-                if kind != WRONG or row.value["started"] == len(names):  # else the goal was reached before it
+                if kind != WRONG or row.value["began"] == len(names):  # else the goal was reached before it
                     counts[kind].append(row.value["success"])
         told = ", ".join(f"{kind} {sum(found)}/{len(found)}" for kind, found in counts.items())
         print(f"{name}: reached the goal: {told}", flush=True)
@@ -83,8 +83,8 @@ def played(task: Task, order: Order, names: tuple[str, ...], scenario: Scenario)
     """What became of a plan in a scenario."""
     found = execution.execute(names, order, scenario, world_of(scenario, task.embodiment), task.horizon)
     assert found
-    started = sum(end != execution.NOT_BEGUN for _, end in found.steps)
-    return {"success": found.success, "reason": found.reason, "seconds": found.seconds, "started": started}
+    began = sum(end != execution.NOT_BEGUN for _, end in found.steps)
+    return {"success": found.success, "reason": found.reason, "seconds": found.seconds, "began": began}
 
 
 if __name__ == "__main__":
