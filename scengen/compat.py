@@ -1,4 +1,4 @@
-"""Differences between the supported versions of MuJoCo (3.5 to 4.x): no other module asks for a version.
+"""Differences between the supported versions of MuJoCo (3.5 to 4.x): no other module checks a version.
 
 Scenes are written and read in the dialect of MuJoCo 3.5, so that a scenario has one text under every version. Multiple
 contacts of convex shapes (`multiccd`) are off there unless a text enables them; in MuJoCo 4 they are on unless a text

@@ -289,7 +289,7 @@ def _quoted(text: str) -> str:
 
 
 def _files_of(group: str) -> str:
-    """Where the files of a group are listed, or their names."""
+    """Command that lists the files of a group, or their names."""
     names = sorted(path.stem for path in (conf_dir() / group).glob("*.yaml"))
     return "see scengen tasks" if group == "task" else f"known: {', '.join(names)}"
 

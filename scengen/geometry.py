@@ -37,7 +37,7 @@ DIRECTIONS = (
     "to the robot's right",
     "away and to the robot's right",
 )
-"""Level directions in words, every 45 deg from x on, counter-clockwise seen from above."""
+"""Level directions as text, every 45 deg from x on, counter-clockwise seen from above."""
 
 
 def spoken(angle: float) -> str:

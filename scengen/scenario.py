@@ -45,7 +45,7 @@ class Shortcut:
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer that a family asks for, as one number. An adversary tries it without looking at the scene.
+    """The answer that a family requires, as one number. An adversary tries it without looking at the scene.
 
     The number means the same in every scenario of the family: the index of a lane, or a share of a height or an offset.
     """
@@ -67,7 +67,7 @@ class Refutation:
     """A checkable reason why a combination of parameters is an invalid scenario."""
 
     reason: str
-    """Reason in words, the same for every scenario that fails in this way, so that rejections can be counted."""
+    """Reason as text, the same for every scenario that fails in this way, so that rejections can be counted."""
     numbers: Mapping[str, float]
     """Numbers that were compared, in SI units."""
 
@@ -213,7 +213,7 @@ class Scenario(abc.ABC):
         return {}
 
     def answer(self) -> Answer | None:
-        """The answer that the task asks for, if it can be stated as one number. Fixed guesses are tried on it."""
+        """The answer that the task requires, if it can be stated as one number. Fixed guesses are tried on it."""
         return None
 
     def constraints(self) -> Iterator[Refutation | None]:

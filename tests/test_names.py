@@ -57,7 +57,7 @@ def test_where_a_name_is_wrong_about_its_id_the_id_counts_and_a_line_says_so(bef
         (
             "8e",
             BadConfig,
-            "'8e' starts 2 ids in here; give more characters: domino_single/id@0/8ed4a4577fe0, domino_sing",
+            "'8e' is a prefix of 2 ids in here; give more characters: domino_single/id@0/8ed4a4577fe0, domino_sing",
         ),
         ("8ed4a4577fe1", NoScenario, r"no scenario in here named '8ed4a4577fe1' \(did you mean '8ed4a4577fe0'\?\)"),
         ("domino_single/id@0", NoScenario, "known: domino_single/id@0/8ed4a4577fe0, "),

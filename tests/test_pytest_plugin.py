@@ -35,7 +35,7 @@ def test_the_checks_of_a_task_run_without_a_file(checked):
     for check in (
         "id: draws are keyed",
         "far: twins differ in the axis alone",
-        "judged alike wherever y puts the scene",
+        "judged alike for all values of y",
     ):
         assert f"scengen/push_block::{check} PASSED" in told
 

@@ -221,7 +221,7 @@ def page(found: Sequence[Found], pythons: Mapping[str, Path]) -> str:
         "",
         "lerobot-lint is made for arms whose actions are the joint angles of the next moment, entry by entry those of "
         "`observation.state`. Here, as in LIBERO's recordings, an action is a motion of the hand, and the state has "
-        "more entries than the action: two of its checks end with an error of their own, and others take velocities "
+        "more entries than the action: two of its checks crash, and others take velocities "
         "and quaternions for angles.",
         "",
     ]

@@ -169,7 +169,7 @@ def accesses(folder: str) -> dict[str, list[float]]:
 
 
 def commands(folder: str) -> dict[str, str]:
-    """Time, memory and output size of every command, in words."""
+    """Time, memory and output size of every command, as text."""
     found, id_ = {}, Pool.open(folder).directory.id(7)
     for what, command in COMMANDS.items():
         with tempfile.TemporaryDirectory() as scratch:

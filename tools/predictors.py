@@ -137,7 +137,7 @@ def _exceptions() -> str:
 
 
 def sentence() -> str:
-    """Which predictor is the best, in words."""
+    """Which predictor is the best, as text."""
     told = ", otherwise ".join(map(_spelled, ranking()))
     if told:
         return f"Where no learner was tried, the best predictor that was ([figures](predictors.md)) stands in: {told}."
@@ -154,7 +154,7 @@ def cell(task: str, found: Mapping[str, Baseline]) -> str:
 
 
 def _spelled(name: str) -> str:
-    """Name of a predictor in words."""
+    """Name of a predictor as text."""
     return name.replace("_", " ")
 
 

@@ -1,4 +1,4 @@
-"""Compares verdicts: the policy `replay` in `vla-eval run` behind a model server of its own, and in `scengen evaluate`.
+"""Compares verdicts: the policy `replay` in `vla-eval run` behind a separate model server, and in `scengen evaluate`.
 
     python check.py POOL [POOL ...]
 

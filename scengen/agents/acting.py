@@ -36,7 +36,7 @@ SEE = "see"
 POSES = "poses"
 POSES_SEEN = "poses_seen"
 MODES = (SEE, POSES, POSES_SEEN)
-"""What a model gets to know of things: pictures alone, poses in the axes of the actions, or the positions at which
+"""Knowledge of bodies that a model gets: pictures alone, poses in the axes of the actions, or the positions at which
 turned pictures show them."""
 
 
@@ -114,7 +114,7 @@ class Episode:
 
     @property
     def told(self) -> dict[str, Any]:
-        """What became of it, as plain data."""
+        """Result of the trial, as plain data."""
         return {
             "right": self.success,
             "reason": self.neutral(self.over),

@@ -99,7 +99,8 @@ class Calls:
             model: stand-in that knows the answers; by default the run's model.
 
         Raises:
-            OutOfBudget: the budget does not allow another call, or only recorded answers count and there is none.
+            OutOfBudget: the budget does not allow another call, or only recorded answers are allowed and this call has
+                none.
         """
         prompt = [{"role": t.role, "text": t.text, "pictures": [_sha(p)[:16] for p in t.pictures]} for t in turns]
         asked = {"about": dict(about), "turns": prompt, "tools": [t.name for t in tools], "temperature": temperature}

@@ -88,7 +88,7 @@ class Fact:
 
     @property
     def form(self) -> str:
-        """Form of the answer, in words for a prompt."""
+        """Form of the answer, as text for a prompt."""
         if not self.options and not self.within:
             return "a whole number"
         if not self.options:
@@ -112,7 +112,7 @@ class Sheet:
 
     names: Mapping[str, str] = field(default_factory=dict)
     """Neutral names of things by body: what a person calls them who only sees the scene. `tile_*` stands for all
-    bodies that begin with `tile_` and have no line of their own."""
+    bodies that begin with `tile_` and have no separate line."""
     parts: list[str] = field(default_factory=list)
     """Names of parts of things, such as a handle, that are not bodies."""
     facts: Mapping[str, Question] = field(default_factory=dict)
@@ -238,7 +238,7 @@ def _options(question: Question) -> tuple[str, ...]:
 
 
 def _recorded(question: Question, shortcuts: Mapping[str, Any]) -> str:
-    """How a certificate says that a shortcut failed, with the filter of the oracles.
+    """Text by which a certificate reports a failed shortcut, with the filter of the oracles.
 
     Raises:
         BadConfig: the certificate does not record the shortcut.

@@ -52,14 +52,14 @@ class Call:
 
 @dataclass(frozen=True)
 class Reply:
-    """What a model answered."""
+    """Answer of a model."""
 
     text: str
-    """Text of the answer; may be empty beside calls."""
+    """Text of the answer; may be empty if there are calls."""
     calls: tuple[Call, ...] = ()
     """Calls of tools."""
     tokens_in: int = 0
-    """Number of tokens of the prompt, as the model counts them; 0 if it does not say."""
+    """Number of tokens of the prompt, as the model counts them; 0 if it does not report it."""
     tokens_out: int = 0
     """Number of tokens of the answer, reasoning included."""
     seconds: float = field(default=0.0, compare=False)
@@ -81,7 +81,7 @@ class Model(Protocol):
         Args:
             turns: the conversation, oldest first.
             tools: functions of which the answer must call one; none if it must be JSON.
-            schema: JSON schema of the answer; empty for free text and beside tools.
+            schema: JSON schema of the answer; empty for free text and with tools.
             temperature: temperature of sampling.
             seed: seed of sampling, for models that have one.
         """

@@ -33,7 +33,7 @@ GRIP_SECONDS = 0.8
 MAX_TICKS = 1000
 """Largest number of control periods of one primitive, 10 s."""
 LOWEST = TABLE_TOP - 0.30
-"""Lowest target of the hand [m]: below the table's top, beside it."""
+"""Lowest target of the hand [m]: below the table's top, at its side."""
 DONE = "Done"
 
 
@@ -83,7 +83,7 @@ class Primitive:
     name: str
     """Name of the primitive."""
     told: str
-    """The call in words, for the memory of the model."""
+    """The call as text, for the memory of the model."""
     plan: Callable[[], Plan]
     """Function that starts its plan of the whole robot."""
 

@@ -1,4 +1,5 @@
-"""What can be answered without a look: the answer to each question that is most often right in training."""
+"""Questions that can be answered without observation: the answer to each question that is most often right in
+training."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

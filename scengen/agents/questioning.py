@@ -22,7 +22,7 @@ from .replies import (
 from .scene import View, prompt, scene_text
 
 Artefact = TypeVar("Artefact")
-"""What a reply of a stage says."""
+"""Content of a reply of a stage."""
 UNDERSTAND = 1
 """Number of the stage of understanding."""
 PLAN = 2
@@ -87,7 +87,7 @@ class Result:
 
     @property
     def outcomes(self) -> list[bool]:
-        """What counts in the table: one value for each question in stage 1, one for a plan or an episode."""
+        """Values that count in the table: one value for each question in stage 1, one for a plan or an episode."""
         if self.stage == UNDERSTAND:
             return [grade == "right" for grade in self.grades.values()]
         return [bool(self.grades["right"])]

@@ -1,4 +1,4 @@
-"""Replies under their JSON schemas: what stage 1 and stage 2 ask for, and what is wrong with the form of a reply."""
+"""Replies under their JSON schemas: the required form of stages 1 and 2, and the faults of a reply."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,12 +31,12 @@ class FormatError(ScengenError):
 
 @dataclass(frozen=True)
 class Seen:
-    """What one frame shows."""
+    """Description of one frame."""
 
     frame: str
     """Name of the frame."""
     seen: str
-    """Description in words."""
+    """Description as text."""
 
 
 @dataclass(frozen=True)
@@ -86,12 +86,12 @@ class Understanding:
 
 @dataclass(frozen=True)
 class Why:
-    """Why the simplest action fails."""
+    """Reason why the simplest action fails."""
 
     constraint: str
     """Id of the question of stage 1 whose answer is the reason."""
     reason: str
-    """Reason in words."""
+    """Reason as text."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Step:
     subgoal: str
     """Name in the vocabulary, or `other`."""
     outcome: str
-    """Physical outcome in words."""
+    """Physical outcome as text."""
     objects: list[str]
     """Names of the objects."""
     before: list[str]

@@ -1,4 +1,4 @@
-"""What a model gets to know of a scene: words, frames and readings, and nothing that names the scenario."""
+"""Description of a scene for a model: words, frames and readings, and nothing that names the scenario."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ from ..sim.embodiment import JAW, SUCTION, hands
 READINGS = ("eef_pos", "eef_quat", "gripper_qpos", "force_torque")
 """Streams whose readings are given to the model, as endings of their names."""
 ARMS = {1: "one Franka Panda arm", 2: "two Franka Panda arms, the right one first"}
-"""Arms in words, by their number."""
+"""Arms as text, by their number."""
 HANDS = {JAW: f"a parallel jaw that opens {1000 * OPENING:.0f} mm wide", SUCTION: "a suction cup"}
-"""Hands in words, by their names."""
+"""Hands as text, by their names."""
 
 
 @dataclass(frozen=True)
 class View:
-    """What was seen and read of a scene: the slots of a prompt that depend on the scenario."""
+    """Pictures and readings of a scene: the slots of a prompt that depend on the scenario."""
 
     frames: Mapping[str, bytes]
     """JPEG pictures by name, such as `agentview at 0.0 s`; none for a model without pictures."""
@@ -61,7 +61,7 @@ def pictures(env: PoolEnv, observation: Observation, when: str) -> dict[str, byt
 
 
 def told(observation: Observation) -> str:
-    """The robot's readings in words, rounded to what sensors resolve."""
+    """The robot's readings as text, rounded to what sensors resolve."""
     named = {name: value for name, value in observation.items() if name.endswith(READINGS)}
     return "; ".join(
         f"{name} {np.array2string(np.asarray(v), precision=3, suppress_small=True)}" for name, v in named.items()
@@ -75,13 +75,13 @@ def streams(embodiment: str, seeing: bool) -> list[str]:
 
 
 def robot(embodiment: str) -> str:
-    """The robot in words."""
+    """The robot as text."""
     names = hands(embodiment)
     return f"{ARMS[len(names)]} with {' and '.join(HANDS[name] for name in names)}."
 
 
 def controller(embodiment: str) -> str:
-    """The controller in words."""
+    """The controller as text."""
     count = len(hands(embodiment))
     per = "" if count == 1 else " for each arm"
     return (

@@ -14,7 +14,7 @@ from .replies import METADATA
 
 @dataclass(frozen=True)
 class Key:
-    """What stand-ins know of a scenario."""
+    """Data of a scenario that stand-ins use."""
 
     facts: tuple[Fact, ...]
     """Facts of the scenario."""

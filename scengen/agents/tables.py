@@ -1,4 +1,4 @@
-"""Tables of a run: shares of right answers by task and category, ID beside OOD, with intervals by scenario."""
+"""Tables of a run: shares of right answers by task and category, ID next to OOD, with intervals by scenario."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,8 @@ def lines(results: Sequence[Mapping[str, Any]], stage: int) -> list[TableLine]:
 
 @dataclass(frozen=True)
 class SightLine:
-    """How far the answers of stage 1 are better than the best answers without a look: 0 as good, 1 all right.
+    """Measure of how much the answers of stage 1 are better than the best answers without a look: 0 as good, 1 all
+    right.
 
     The measure is Cohen's kappa with the best fixed answers of training in place of chance: (share of right answers -
     prior) / (1 - prior), over the questions whose prior is below 1.
@@ -104,7 +105,7 @@ def executed_lines(results: Sequence[Mapping[str, Any]]) -> list[TableLine]:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Audits of plans beside their outcomes."""
+    """Audits of plans next to their outcomes."""
 
     right: int
     """Number of plans that are right and were carried out."""
@@ -113,7 +114,7 @@ class Agreement:
     wrong: int
     """Number of plans that are wrong and were carried out."""
     wrong_reached: int
-    """Number of them that reached the goal all the same."""
+    """Number of them that still reached the goal."""
     no_moves: tuple[str, ...]
     """Tasks that state no moves for their sub-goals; their plans are not carried out."""
 
@@ -175,7 +176,7 @@ def plan_errors(results: Sequence[Mapping[str, Any]]) -> Counter[str]:
 
 
 def lost_in_twins(results: Sequence[Mapping[str, Any]], stage: int) -> tuple[int, int]:
-    """How often training is understood and the OOD twin is not.
+    """Share of answers that are right in training and wrong in the OOD twin.
 
     Returns:
         Number of answers that are right in training and not in the twin of the same index, and number of answers that

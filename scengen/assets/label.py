@@ -24,7 +24,7 @@ Surface = Callable[[float, float], tuple[Vec3, Vec3]]
 
 @dataclass(frozen=True)
 class Label:
-    """What is printed on a package."""
+    """Print on a package."""
 
     word: str
     """Capital letters."""

@@ -166,7 +166,7 @@ class AttackJob:
     rules: Rules = STRICT
     """Rules that end an episode."""
     known: Experience = Experience()
-    """What the adversary knows from training."""
+    """Data from training that the adversary uses."""
     until: Callable[[Hit], bool] = never
     """Test of a hit at which the attack on a scenario ends."""
 

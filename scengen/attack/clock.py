@@ -20,7 +20,7 @@ SHARES = (0.5, 1.0, 0.0)
 
 
 def timed(player: Player) -> Iterator[Attempt]:
-    """The own solution with the training durations of its waits; nothing if these hardly vary."""
+    """The own solution with the training durations of its waits; nothing if these vary by less than `MIN_SPREAD`."""
     own = player.trace.waits
     known = [times for times in player.durations if len(times) == len(own)]
     if len(known) < 3 or not own or np.ptp(known, axis=0).max() < MIN_SPREAD:

@@ -46,7 +46,7 @@ passes with a probability of 13 %."""
 
 
 def spelled(raw: bool) -> str:
-    """How actions reach the controller, in a word."""
+    """Path of actions to the controller, in one word."""
     return "raw" if raw else "filtered"
 
 
@@ -61,7 +61,7 @@ class Hit:
     raw: bool
     """Whether its actions reached the controller without the teleoperation filter."""
     plan: str
-    """Description of the attempt, in words."""
+    """Description of the attempt, as text."""
     seconds: float
     """Time at which the goal was reached [s]."""
     digest: str

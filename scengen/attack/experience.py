@@ -1,4 +1,4 @@
-"""What a policy may know of a task from training: solutions by heart, and how long waits last."""
+"""Knowledge of a task that a policy may have from training: memorised solutions, and the durations of waits."""
 
 from collections.abc import Collection, Iterator
 from contextlib import suppress
@@ -25,7 +25,7 @@ MAX_DRAWS = 24
 
 @dataclass(frozen=True)
 class Experience:
-    """What the tiers `memory` and `clock` know from training."""
+    """Data from training that the tiers `memory` and `clock` use."""
 
     memories: tuple[Memory, ...] = ()
     """Training solutions, the best one first."""

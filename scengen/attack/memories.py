@@ -1,7 +1,8 @@
 """Tier of memories: one training solution for all scenarios, carried to each by the pose of a body.
 
-A policy that knows one demonstration by heart and sees where a body is acts like this. The solutions come from training
-draws of another seed. There, the best ones are chosen; the attack measures them on the scenarios that it is about.
+A policy that has memorised one demonstration and sees the pose of a body acts like this. The solutions come from
+training draws of another seed. There, the best ones are chosen; the attack measures them on the scenarios that it is
+about.
 """
 
 from collections.abc import Iterator, Sequence

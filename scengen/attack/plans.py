@@ -195,7 +195,7 @@ def await_turn(arm: Arm, body: str, angle: float = math.radians(20.0), seconds: 
 def meet(arm: Arm, body: str, at: ArrayLike, rot: Mat3, periods: int = 2, seconds: float = 6.0) -> Plan:
     """Wait where a swinging body turns round, and close the jaw when it is seen to be slow there.
 
-    The hand comes from behind while the body is on its way out. A jaw that is hardly open closes at once.
+    The hand comes from behind while the body is on its way out. A jaw that is almost closed closes at once.
 
     Args:
         arm: the arm.

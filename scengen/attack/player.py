@@ -61,7 +61,7 @@ class Node:
     signature: Signature
     """Signature so far."""
     about: str = ""
-    """Description of the way to the state, in words; empty at the start."""
+    """Description of the way to the state, as text; empty at the start."""
 
     def after(self, what: object) -> str:
         """Description of the way to the state, and of a further move."""
@@ -180,7 +180,7 @@ class Player:
 
     @cached_property
     def latches(self) -> frozenset[ContactPair]:
-        """Contacts since the start that the goal or its rules ask for, as pairs of names: those that they look up where
+        """Contacts since the start that the goal or its rules query, as pairs of names: those that they look up where
         the witness has reached the goal, and that have occurred."""
         self.rewind(len(self.trace.stages) - 1)
         world = RecordingWorld.twin(self.world)

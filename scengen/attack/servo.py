@@ -117,7 +117,7 @@ def chases(arm: Arm, body: str) -> Iterator[Macro]:
 
 
 def met(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
-    """Wait for a hinged body where the witness first touches it, with a jaw that is hardly or wide open."""
+    """Wait for a hinged body where the witness first touches it, with a jaw that is slightly or wide open."""
     place = player.trace.hand_at(arm.number, body)
     if place is not None:
         for periods in (1.0, 2.0, 0.0):
@@ -126,7 +126,7 @@ def met(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
 
 def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
     """Carry a body along the way that it takes in the witness, its narrow side or its broad side across; pick it, touch
-    with it what the goal asks for, and carry it to its goal by every route."""
+    with it the bodies that the goal requires, and carry it to its goal by every route."""
     pick = taking(player, arm, body)
     for skew in (0.0, QUARTER):
         take = turned(player, arm, body, skew, 0.0)
@@ -142,7 +142,8 @@ def carried(player: Player, arm: Arm, body: str) -> Iterator[Attempt]:
 
 
 def all_carried(player: Player, arm: Arm, bodies: Sequence[str]) -> Iterator[Attempt]:
-    """Every handled body in the order of the witness: take it, touch with it what the goal asks for, carry it there."""
+    """Every handled body in the order of the witness: take it, touch with it the bodies that the goal requires, carry
+    it there."""
     asked = {body: must_touch(player, body) for body in bodies}
     touches = (touched_at_goal, touched_straight, untouched) if any(asked.values()) else (untouched,)
     for route, skew, drop, touch in product(CARRIED, (0.0, QUARTER), DROPS, touches):

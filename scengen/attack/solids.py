@@ -155,7 +155,7 @@ def _ancestors(world: World, body: int) -> list[int]:
 
 
 def _subtree(world: World, body: int, whole: bool) -> list[int]:
-    """Geoms of a body; with `whole`, also those of all bodies that hang on it."""
+    """Geoms of a body; with `whole`, also those of all bodies attached to it."""
     of = {b for b in range(body, world.model.nbody) if b == body or (whole and body in _ancestors(world, b))}
     return [g for g in range(world.model.ngeom) if int(world.model.geom_bodyid[g]) in of]
 

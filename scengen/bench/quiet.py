@@ -25,7 +25,7 @@ def scheduled() -> tuple[float, float]:
 
 
 def disturbance(load: float, waiting: float, ratios: Mapping[str, Measure]) -> str:
-    """Why the machine was not quiet; empty if it was.
+    """Reason why the machine was not quiet; empty if it was.
 
     Args:
         load: load average at the start [processes].

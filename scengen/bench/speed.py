@@ -1,6 +1,6 @@
 """Measurement of the costs that scengen promises, as ratios within one run: `scengen bench`.
 
-Both sides of a ratio work by turns in short slices, of which only the processor time counts. What else the machine does
+Both sides of a ratio work in turn in short slices, of which only the processor time counts. What else the machine does
 slows both alike then.
 """
 

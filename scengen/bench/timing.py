@@ -1,4 +1,4 @@
-"""Times of sides that work by turns, and what is promised of their ratios."""
+"""Times of sides that work in turn, and what is promised of their ratios."""
 
 import statistics
 import time
@@ -53,7 +53,7 @@ Side = Callable[[], Iterator[None]]
 
 
 def alternated(sides: Sequence[Side], repeats: int) -> list[tuple[float, ...]]:
-    """Processor time of each side in each repetition [s]. The sides work by turns, a slice each.
+    """Processor time of each side in each repetition [s]. The sides work in turn, a slice each.
 
     A first repetition, which compiles code and fills caches, does not count.
     """

@@ -43,7 +43,7 @@ def vector_ratios(folder: str, row: PoolRow, repeats: int) -> dict[str, Measure]
 
 
 def _rates(several: tuple[VectorEnv, ...], single: PoolEnv, actions: Actions) -> tuple[float, ...]:
-    """Steps in a second of some vector environments, and of one environment; they work by turns, a slice each."""
+    """Steps in a second of some vector environments, and of one environment; they work in turn, a slice each."""
     for envs in (*several, single):
         envs.reset(seed=0)
     spent = [0.0] * (len(several) + 1)
@@ -77,7 +77,7 @@ def _stepping(envs: PoolVectorEnv, actions: Actions) -> Side:
 
 
 def _bare(row: PoolRow, actions: Actions) -> Side:
-    """The bare mj_step calls of as many simulations, by turns as the slots take them, through the same states."""
+    """The bare mj_step calls of as many simulations, in turn as the slots take them, through the same states."""
     worlds = [stored_world(row) for _ in range(SLOTS)]
     substeps = worlds[0].loop.substeps
     controls = np.zeros((len(actions) * substeps, worlds[0].model.nu))

@@ -28,7 +28,7 @@ COMPLETING = ("--completion", "--complete")
 """Options that shells use."""
 GRACE = 1.5
 """Time that an interrupted command has to clean up before it is ended [s]."""
-OUT_OF_MEMORY = "out of memory; ask for less at once, use fewer workers, or raise the limit of memory (ulimit -v)"
+OUT_OF_MEMORY = "out of memory; process less at once, use fewer workers, or raise the limit of memory (ulimit -v)"
 """Message for a command that has no memory left."""
 NO_MEMORY = "Could not allocate memory"
 """Words with which MuJoCo reports a lack of memory, in exceptions of multiple types."""
@@ -201,7 +201,7 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
 
 
 def _unknown(verb: str, arguments: Sequence[str]) -> BadConfig:
-    """Why the beginning of a command line names no command."""
+    """Reason why the beginning of a command line names no command."""
     if verb in FORMS:
         given = next((cut(repr(word)) for word in arguments if not word.startswith("-")), "nothing")
         forms = FORMS[verb]

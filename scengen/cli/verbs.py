@@ -20,7 +20,7 @@ FORMS: Mapping[str, tuple[str, ...]] = {
     "evaluate": ("power",),
     "axis": ("card", "discover", "shrink"),
 }
-"""Second words that some commands take, each a form of the command with settings of its own: `scengen show film`."""
+"""Second words that some commands take, each a form of the command with its own settings: `scengen show film`."""
 ONLY_FORMS = ("axis",)
 """Commands that need a second word."""
 COMMANDS = tuple(verb for verbs in GROUPS.values() for verb in verbs)

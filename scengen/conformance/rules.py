@@ -95,14 +95,14 @@ def checks(
         for split, check in wanted
     ]
     return [
-        Rule("the file tells what policies may know", partial(_describes_axes, found)),
+        Rule("the file states what policies may know", partial(_describes_axes, found)),
         Rule("the family states its version", partial(_states_version, found, search(conf))),
         *of_splits,
     ]
 
 
 def _readable_name(check: Callable[..., None]) -> str:
-    """Name of a check: that of its function in words."""
+    """Name of a check: that of its function as text."""
     return check.__name__.strip("_").replace("_", " ")
 
 
@@ -120,7 +120,7 @@ def frame_checks(task: str, conf: str | Path | None = None, seed: int = 0) -> li
     found = compose.load_task(task, search(conf))
     scenario = found.draw(ID, seed, 0).scenario
     return [
-        Rule(f"judged alike wherever {other.parameter} puts the scene", partial(_judged_alike, found, scenario, other))
+        Rule(f"judged alike for all values of {other.parameter}", partial(_judged_alike, found, scenario, other))
         for other in frames.moved(scenario, f"{task}/{seed}")
     ]
 

@@ -1,6 +1,6 @@
 """Environments that differ from the running one in MuJoCo alone: made by venv and pip, and kept.
 
-An environment has pip and MuJoCo of its own. Everything else (scengen, numpy, numba, tasks of other packages) is that
+An environment has its own pip and MuJoCo. Everything else (scengen, numpy, numba, tasks of other packages) is that
 of the running environment, through a .pth file. So the same code is compared under another MuJoCo.
 """
 

@@ -145,7 +145,7 @@ def _checked(trial: Trial, name: str) -> Check:
 
 
 def _compared(found: Sequence[Check], stored: Mapping[str, Check]) -> tuple[RepeatedCheck, ...]:
-    """The checks, each beside its entry in the certificate."""
+    """The checks, each with its entry in the certificate."""
     repeated = []
     for check in found:
         before = stored[check.name]

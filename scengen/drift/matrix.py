@@ -84,7 +84,7 @@ def _entry(judgement: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _certified(certificate: Any, horizon: float) -> dict[str, Any]:
-    """The margins of a certificate, which are reported beside a flipped check."""
+    """The margins of a certificate, which are reported with a flipped check."""
     numbers = {check.name: dict(check.numbers) for check in certificate.checks}
     robust = {name: numbers["robust"].get(name) for name in ("solved", "runs")}
     seconds = numbers["witness"].get("seconds")
@@ -157,7 +157,7 @@ def change(check: Mapping[str, Any]) -> str:
 
 
 def margins(certificate: Mapping[str, Any]) -> str:
-    """The margins of a certificate, in words."""
+    """The margins of a certificate, as text."""
     robust, numerics = certificate["robust"], certificate["numerics"]
     parts = [f"{robust['solved']} of {robust['runs']} jittered runs", _time(certificate)]
     fell = [name.replace("_", " ") for name, kept in numerics.items() if kept.get("witness") != "success"]

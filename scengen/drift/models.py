@@ -29,7 +29,7 @@ OPTIONS = ("timestep", "integrator", "solver", "cone", "impratio", "tolerance", 
 
 
 def model_difference(one: mujoco.MjModel, other: mujoco.MjModel) -> str:
-    """The first difference of two models, in words; empty if they describe the same physics."""
+    """The first difference of two models, as text; empty if they describe the same physics."""
     for option in (*OPTIONS, "gravity", "wind"):
         if not _equal(getattr(one.opt, option), getattr(other.opt, option)):
             return f"the option {option} is {getattr(one.opt, option)} instead of {getattr(other.opt, option)}"

@@ -1,6 +1,6 @@
 """The costs of the control loop under several versions of MuJoCo: `scengen bench mujoco=[3.5.0,4.0.0]`.
 
-Runs in each environment. The versions work by turns, a repetition each, so that what else the machine does slows all of
+Runs in each environment. The versions work in turn, a repetition each, so that what else the machine does slows all of
 them.
 """
 

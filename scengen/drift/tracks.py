@@ -1,4 +1,5 @@
-"""Where and when the witness of a scenario parts under two versions of MuJoCo: the cause of a verdict that flips.
+"""Place and time at which the witness of a scenario diverges under two versions of MuJoCo: the cause of a verdict that
+flips.
 
 The same actions move the same scene under both versions, so bodies are equal up to rounding until a contact amplifies
 it. The first body that is elsewhere, and what it touches then, name that contact. Runs in each environment.
@@ -68,7 +69,7 @@ def parted(one: Track, other: Track) -> list[dict[str, Any]]:
 
 
 def in_words(moments: Sequence[Mapping[str, Any]]) -> str:
-    """What `parted` has found, in one line."""
+    """Result of `parted`, in one line."""
     parts = [
         f"{one['body']} {one['mm']:g} mm elsewhere after {one['seconds']:g} s, "
         f"touching {', '.join(one['touching']) or 'nothing'}"

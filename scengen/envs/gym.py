@@ -60,12 +60,12 @@ RESET_OPTIONS = ("scenario", "labels")
 INFOS = ("success", "is_success", "reason", "time")
 """Entries of `info` without labels."""
 MAX_ACTION_REPEAT = 100
-"""Largest `action_repeat` [control periods]: one second. With longer repeats the arm is hardly controlled."""
+"""Largest `action_repeat` [control periods]: one second. Longer repeats leave the arm without effective control."""
 
 
 @dataclass(frozen=True)
 class ObservationSettings:
-    """What an environment observes: its streams, its cameras, and the size of all pictures."""
+    """Observations of an environment: its streams, its cameras, and the size of all pictures."""
 
     streams: Mapping[str, Stream]
     """Streams to read, by name, in the requested order."""
@@ -332,7 +332,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._spec = spec
 
     def _progress(self) -> dict[str, Any]:
-        """Everything that a copy needs to continue, beside the arguments of `__init__`."""
+        """Everything that a copy needs to continue, in addition to the arguments of `__init__`."""
         made = {"next": self._next, "random": self._np_random, "random_seed": self._np_random_seed}
         if self._world is None:
             return made

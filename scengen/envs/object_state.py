@@ -45,7 +45,7 @@ from ..sim.world import World
 NAME = "object-state"
 """robosuite's name of the whole vector."""
 COMMON_BODIES = ("world", "table")
-"""Bodies that are the same in every scenario, and left out."""
+"""Bodies that are the same in every scenario and therefore omitted."""
 
 POSE = {"pos": ("x", "y", "z"), "quat": ("x", "y", "z", "w")}
 """Parts of a pose, and the names of their entries."""

@@ -172,7 +172,7 @@ class Comparison:
 
 
 def edition_told(name: str) -> dict[str, str]:
-    """What results say of the edition that they are about."""
+    """Entry of results for the edition to which they refer."""
     edition = Edition.read(name)
     return {"name": edition.name, "sha256": edition.sha256}
 

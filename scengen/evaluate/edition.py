@@ -245,7 +245,7 @@ def frozen(pool: Pool) -> Iterator[Frozen]:
 
 
 def differences(edition: Edition, key: str) -> Iterator[str]:
-    """What this version of scengen draws or builds otherwise in a set, in words; certificates are not made again.
+    """Differences of the draws or scenes of this version from a set, as text; certificates are not made again.
 
     Raises:
         ScengenError: there is no such task or split.

@@ -47,8 +47,8 @@ def phase(world: World) -> str:
 
 
 class PolicyPlayer:
-    """Plays batches of rollouts: those of a batch at once, each in a slot of a vector environment, by a policy of its
-    own. It keeps the environment and the policies as long as the task stays the same."""
+    """Plays batches of rollouts: those of a batch at once, each in a slot of a vector environment, by its own policy.
+    It keeps the environment and the policies as long as the task stays the same."""
 
     def __init__(
         self,
@@ -120,7 +120,7 @@ class PolicyPlayer:
         return [None] * len(rollouts) if found is None else [*found]
 
     def _tried(self, rollouts: "Sequence[_Rollout]", part: str, call: Callable[[], A]) -> A | None:
-        """What a part of a policy returns; None if it crashes, which ends its rollouts."""
+        """Return value of a part of a policy; None if it crashes, which ends its rollouts."""
         try:
             with policy_errors(self.settings.name, part):
                 return call()
@@ -195,7 +195,7 @@ class _Rollout:
     env: PoolEnv
     policy: Policy
     record: dict[str, Any] = field(default_factory=dict)
-    """What is known at its end; empty before."""
+    """Data that are known only at the end of the episode; empty before."""
 
     @property
     def seed(self) -> int:

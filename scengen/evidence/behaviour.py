@@ -285,7 +285,7 @@ def _answers(
     book: Book,
     state: str,
 ) -> dict[str, Any]:
-    """What the rules say of a stored state and its surroundings."""
+    """Answers of the rules in a stored state and around it."""
     return {
         "answers": book.numbers(probe.answers()),
         "numbers": probe.numbers(),

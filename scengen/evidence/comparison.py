@@ -43,7 +43,7 @@ class Difference:
     kind: str
     """Kind of behaviour, such as `draw`, `scene`, `constraint`, `success or failure`, `events`, `oracle`."""
     what: str
-    """What differs, such as the name of a split or a rollout."""
+    """Object that differs, such as the name of a split or a rollout."""
     stored: Any
     """Stored value; None if there is none."""
     now: Any
@@ -74,7 +74,7 @@ class Compared:
 
     @property
     def reproduces(self) -> str:
-        """What this machine reproduces: `bits`, `verdicts`, or `no`."""
+        """Part of the behaviour that this machine reproduces: `bits`, `verdicts`, or `no`."""
         levels = {difference.level for difference in self.differences}
         if "version" in levels:
             return "no"
@@ -217,7 +217,7 @@ def _rollouts(
 
 
 def merged(stored: Behaviour, observed: Behaviour) -> Behaviour:
-    """What a file stores after a change that kept every verdict: its states and limits, and the present bits.
+    """Content of a file after a change that kept every verdict: its states and limits, and the present bits.
 
     A verdict that rounding decides keeps its mark.
     """

@@ -1,4 +1,4 @@
-"""How an episode combines the answers of a goal and its failure, for any task."""
+"""Combination of the answers of a goal and its failure by an episode, for any task."""
 
 import hashlib
 import json

@@ -1,6 +1,6 @@
 """The ledger of measured figures: records/<kind>/<task>.jsonl, one line for each measurement.
 
-A figure belongs to the version of its task that it was measured on. Readers ask for the rows of today's version; a row
+A figure belongs to the version of its task that it was measured on. Readers request the rows of today's version; a row
 of another version is only named, never shown as if it were of this one.
 """
 
@@ -67,7 +67,7 @@ class Evidence:
 
     @property
     def place(self) -> str:
-        """What a row of the same kind and task must differ in to stand beside this one: the split and the settings."""
+        """Keys in which another row of the same kind and task must differ from this one: the split and the settings."""
         return json.dumps([self.split, self.made_with], sort_keys=True)
 
     def has(self, **made_with: Any) -> bool:

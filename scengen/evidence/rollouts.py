@@ -69,7 +69,7 @@ OnChange = Callable[[World, str, NDArray[np.float64], str], None]
 
 @dataclass
 class Trace:
-    """What the rules of a scenario say in each control period of a rollout."""
+    """Answers of the rules of a scenario in each control period of a rollout."""
 
     scenario: Scenario
     changes: list[tuple[float, str]] = field(default_factory=list)
@@ -90,8 +90,8 @@ class Trace:
 
 
 def answer_of(scenario: Scenario, world: World) -> str:
-    """What the rules say of a state: the reason of a failure, whether the goal holds, whether an event is pending, and
-    the memory. Numbers of the memory that are not whole are left out, because they change in every period."""
+    """Answers of the rules in a state: the reason of a failure, whether the goal holds, whether an event is pending,
+    and the memory. Numbers of the memory that are not whole are left out, because they change in every period."""
     lost = scenario.failure(world)
     parts = [without_numbers(lost) if lost else "goal" if scenario.success(world) else "open"]
     if lost is not None:

@@ -76,12 +76,12 @@ class Coordinate:
 
 
 Contacts = Literal["same", "none", "all"]
-"""Which of the contacts that the rules ask for there are: those of the state, none, or all."""
+"""Existing contacts among those that the rules query: those of the state, none, or all."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a limit is looked for: along a coordinate, and with which contacts."""
+    """Place at which a limit is sought: along a coordinate, and with which contacts."""
 
     coordinate: Coordinate
     contacts: Contacts = "same"
@@ -121,7 +121,7 @@ class Probe:
     def answers(
         self, changes: Mapping[Coordinate, float] | None = None, contacts: Sequence["Contact"] = ()
     ) -> tuple[str, str]:
-        """What the rules say after changes of the state: of success and failure, and of events.
+        """Answers of the rules after changes of the state: of success and failure, and of events.
 
         Args:
             changes: magnitudes of the changes by coordinate.
@@ -144,15 +144,15 @@ class Probe:
         return _answered(lambda: answer_of(self.scenario, world)), _answered(self._happened)
 
     def at(self, place: Place, magnitude: float) -> tuple[str, str]:
-        """What the rules say after a change at a place."""
+        """Answers of the rules after a change at a place."""
         return self.answers({place.coordinate: magnitude}, self._turned[place.contacts])
 
     def around(self, place: Place, magnitude: float) -> list[tuple[str, str]]:
-        """What the rules say just below a magnitude of a change, and just above it."""
+        """Answers of the rules just below a magnitude of a change, and just above it."""
         return [self.at(place, magnitude * (1.0 + side)) for side in (-MARGIN, MARGIN)]
 
     def _happened(self) -> str:
-        """What the events do in the state: whole numbers of the memory, and kinds of other effects."""
+        """Effects of the events in the state: whole numbers of the memory, and kinds of other effects."""
         world, data, scenario = self.world, self.world.data, self.scenario
         if type(scenario).events is Scenario.events:
             return ""
@@ -334,7 +334,7 @@ class Limit:
 
     @property
     def kind(self) -> tuple[Any, ...]:
-        """What changes at the limit, and along which line; with other contacts than those of the state, for any
+        """Quantity that changes at the limit, and its line; with other contacts than those of the state, for any
         body."""
         place, line = self.place, self.place.coordinate.line
         sides = ({part for answer in side for part in answer.split(", ")} for side in (self.before, self.after))

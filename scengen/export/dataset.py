@@ -1,6 +1,6 @@
 """Reader of the LeRobot recordings of `scengen record`. What cannot be read is one line with the remedy.
 
-A recording may be a stranger's: only plain files in its folder are opened, and what they unpack to is bounded.
+A recording may be untrusted: only plain files in its folder are opened, and what they unpack to is bounded.
 """
 
 import json

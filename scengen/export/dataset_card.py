@@ -40,7 +40,7 @@ def card(info: Mapping[str, Any], instructions: Iterable[str], source: Mapping[s
         "",
         "* `action` is the mean action of a row; `control.actions` holds those of all its control periods (100 Hz), "
         "as the controller received them, behind the teleoperation filter. Play them without a filter.",
-        "* `waiting` marks rows in which the robot waits on purpose: their action asks no arm for a motion.",
+        "* `waiting` marks rows in which the robot waits on purpose: their action commands no arm to move.",
         "* `meta/stats.json` has smallest spreads: 1 mm, 0.5 deg, 1 N. Constant dimensions are not divided by 1e-8.",
         "* `scengen/...` columns of the table of episodes name scenario, parameters, seed and index of each episode; "
         "`scengen/absent` lists bodies of `observation.environment_state` that the scene lacks, whose entries read 0.",

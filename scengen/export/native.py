@@ -1,4 +1,4 @@
-"""Streams at the paper's rates, beside the rows of a LeRobot data set (paper, App. C, table of modalities).
+"""Streams at the paper's rates, next to the rows of a LeRobot data set (paper, App. C, table of modalities).
 
     native/100hz/chunk-000/file-000.parquet    a row per control period: all streams but the following, action, reward
     native/50hz/chunk-000/file-000.parquet     a row per two control periods: wrists' wrenches and tactile grids

@@ -4,8 +4,8 @@ streams.
 A LeRobot data set has one rate, `fps`. A row holds the observations at one moment and the actions until the next row:
 with 25 rows per second, those of four control periods. All actions are kept: `control.actions` holds those that the
 controller received in all control periods of the row. LeRobot takes every column whose name starts with `action` for an
-output of the policy, hence the name. These actions have passed the teleoperation filter; give them to
-an environment without a filter. robomimic's data have a row for every control period (`scengen.export.robomimic`).
+output of the policy, which explains the name. These actions have passed the teleoperation filter; give them to an
+environment without a filter. robomimic's data have a row for every control period (`scengen.export.robomimic`).
 """
 
 from collections import Counter

@@ -17,7 +17,7 @@ from ..scenario import Scenario
 from ..sim.world import World
 
 MOVING_ACTION = 0.1
-"""Number of an action's motion above which it asks for a motion: five times the noise of demonstrations."""
+"""Size of an action's motion above which it counts as a command to move: five times the noise of demonstrations."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Snapshot:
 
 
 def asks_for_motion(action: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether actions ask each arm for a motion, shape (..., arms), of actions of shape (..., 7 * arms)."""
+    """Whether actions command a motion of each arm, shape (..., arms), of actions of shape (..., 7 * arms)."""
     arms = action.reshape(*action.shape[:-1], -1, ACTION)
     return np.abs(arms[..., :MOTION]).max(axis=-1) > MOVING_ACTION
 
@@ -70,7 +70,7 @@ class DatasetRow:
 
     @property
     def waiting(self) -> bool:
-        """Whether the robot waits on purpose: the action of the row asks no arm for a motion."""
+        """Whether the robot waits on purpose: the action of the row commands no arm to move."""
         return not asks_for_motion(self.action).any()
 
 

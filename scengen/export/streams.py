@@ -17,7 +17,7 @@ ENVIRONMENT = "observation.environment_state"
 
 @dataclass
 class Playing:
-    """What streams need to know about the scenario that is being played."""
+    """Data of the running scenario that streams need."""
 
     orientation: Orientation = UPRIGHT
 

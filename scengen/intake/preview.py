@@ -1,4 +1,4 @@
-"""A picture of an asset on the table: its visual mesh, and beside it its collision geometry."""
+"""A picture of an asset on the table: its visual mesh, and next to it its collision geometry."""
 
 import math
 from dataclasses import replace

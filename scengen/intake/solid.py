@@ -242,7 +242,7 @@ def _manifold(path: str, points: Points, faces: Indices) -> Manifold:
 
 
 def _about(parts: list[Manifold]) -> str:
-    """Parts of a file in words, with a remedy."""
+    """Parts of a file as text, with a remedy."""
     volumes = [1e6 * part.volume() for part in parts]
     sizes = ", ".join(f"{abs(volume):.3g}" for volume in volumes[:5])
     cavities = [part for part in parts if part.volume() < 0.0]

@@ -1,11 +1,11 @@
 """Epochs of a training, each of which is kept on disk: a training that was interrupted continues after the last one.
 
 The perceptrons are scikit-learn's `MLPRegressor`. An epoch is one `fit` of each that continues from the weights of the
-epoch before, with fresh noise and a learning rate of its own. All random numbers depend on the seed, the member and the
+previous epoch, with fresh noise and its own learning rate. All random numbers depend on the seed, the member and the
 epoch, and the arithmetic runs on one core: the same data give the same weights, with or without interruptions.
 
 One pass of one perceptron over 48 300 rows of 176 inputs took scikit-learn 1.0 to 1.5 s of processor time, and the same
-network in jax 0.7.1 (compiled, one core, by turns) 0.65 to 0.9 s. This saves too little for another dependency.
+network in jax 0.7.1 (compiled, one core, in turn) 0.65 to 0.9 s. This saves too little for another dependency.
 """
 
 import math
@@ -24,7 +24,7 @@ from .samples import Samples
 from .store import arrays_as_bytes, network_shapes, read_arrays
 
 INPUT_NOISE = 0.02
-"""Standard deviation of the noise on inputs in training [standard deviations]. It stands for states beside those of the
+"""Standard deviation of the noise on inputs in training [standard deviations]. It represents states near those of the
 demonstrations."""
 BATCH = 256
 """Rows per step of the optimiser."""

@@ -1,4 +1,4 @@
-"""What a policy learns: inputs and standardised chunks of goals at each row of the demonstrations."""
+"""Training samples of a policy: inputs and standardised chunks of goals at each row of the demonstrations."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ Arrays = Mapping[str, NDArray[np.float32]]
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """What a policy learns: inputs, shape (n, size), and standardised chunks, shape (n, outputs)."""
+    """Training samples of a policy: inputs, shape (n, size), and standardised chunks, shape (n, outputs)."""
 
     inputs: NDArray[np.float32]
     chunks: NDArray[np.float32]

@@ -65,7 +65,7 @@ class Broken(ValueError):
 
 @dataclass(frozen=True)
 class PolicySettings:
-    """What a folder says of its policy."""
+    """Description of a policy in its folder."""
 
     kind: str
     """Name of the policy, one of `models.KINDS`."""
@@ -257,7 +257,7 @@ def read_arrays(path: Path | io.BytesIO, shapes: Mapping[str, tuple[int, ...]]) 
     """Arrays of known shapes. The shape in a header is compared before memory is taken for it.
 
     Raises:
-        Broken: an array is missing, or another one than expected, or the file is not an archive.
+        Broken: an array is missing or differs from the expected one, or the file is not an archive.
     """
     try:
         with zipfile.ZipFile(path) as archive:

@@ -26,7 +26,7 @@ from .samples import parted, samples_of, scaling_of
 from .store import FORMAT, LOSS, MAX_MEMBERS, Broken, PolicySettings, StoredPolicy, is_policy
 
 GIVEN_BY_DATA = ("data", "to", "demonstrations", "task")
-"""Settings that change no weights, or only by the data, which have a hash of their own."""
+"""Settings that change no weights, or only by the data, which have a separate hash."""
 UNFINISHED = "unfinished-{identity}.npz"
 """Name of the file of weights of an unfinished training."""
 
@@ -91,7 +91,7 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
     """Train a policy and write it to `settings.to`. An interrupted training continues after its last epoch.
 
     Args:
-        progress: called with the number of finished epochs, the number of all, and the last losses in words.
+        progress: called with the number of finished epochs, the number of all, and the last losses as text.
 
     Raises:
         BadConfig: the folder holds another policy or another unfinished training, or cannot be written.

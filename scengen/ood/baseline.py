@@ -1,4 +1,4 @@
-"""What is played on an axis with what was right in training, and the verdict that follows from it."""
+"""Baselines that worked in training, played on an axis, and the resulting verdict."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ LEARNERS = ("bc", "mip", "knn")
 MEMORIES = {"motion memory": MOTION, "object-centric memory": OBJECT_CENTRIC}
 """Kinds of memory, from the weaker to the stronger."""
 KINDS = {**MEMORIES, "belief": BELIEF, "learner": LEARNERS}
-"""What an axis can break, each kind with its baselines."""
+"""Kinds of baselines that an axis can break, each with its members."""
 MIN_OWN_SUCCESS = 0.9
 """Minimum share of its own scenarios that a baseline has to solve again. Below it, the baseline is too weak."""
 MIN_CONTROL_SUCCESS = 0.3
-"""Minimum share of its control arm that a baseline has to solve. Below it, the baseline is too weak."""
+"""Minimum share of its control scenarios that a baseline has to solve. Below it, the baseline is too weak."""
 SOLVED_SHARE = 0.5
 """An axis counts as solved by a baseline if the interval of its success lies above this share."""
 INCONCLUSIVE = "inconclusive"
@@ -33,7 +33,7 @@ COUNTS = ("twins", "training", "here", "both")
 
 @dataclass(frozen=True)
 class Baseline:
-    """Success of one baseline on an axis. Only twins count that the oracle solves in both arms."""
+    """Success of one baseline on an axis. A pair counts only if the oracle solves both scenarios."""
 
     name: str
     own: float
@@ -41,13 +41,13 @@ class Baseline:
     control: str
     """Kind of the control: `moved within training` or `held-out training`."""
     training: Rate | None
-    """Success rate in the control arm; None if there was no twin to try."""
+    """Success rate in the control condition; None if there was no twin to try."""
     here: Rate | None
     """Success rate in the OOD twins."""
     excess: Difference | None
     """Difference `training` minus `here`, paired by twins."""
     both: int = 0
-    """Number of twins that are solved in both arms."""
+    """Number of twins that are solved in both conditions."""
 
     @classmethod
     def of(cls, name: str, control: str, arms: Sequence[tuple[bool, bool]], own: float = 1.0) -> Self:
@@ -112,7 +112,8 @@ class Baseline:
 
 
 def verdict(baselines: Iterable[Baseline]) -> str:
-    """What an axis breaks: the strongest kind of memory, belief, learner, as in `breaks object-centric memory, belief`.
+    """Kinds of baselines that an axis breaks: the strongest kind of memory, belief, learner, as in `breaks
+    object-centric memory, belief`.
 
     If it breaks nothing, `solved by` the first kind that solves most of it, as `solved by motion memory`; otherwise
     `INCONCLUSIVE`. A learner that solves the axis contradicts no verdict: it can interpolate where a memory cannot.

@@ -6,8 +6,8 @@ as much as training scenarios do. `excess` is the loss of success from the secon
 
 * `replay`: the actions that solve the training twin. `object_centric`: its path relative to bodies, see
   `solution_memory`. The control is the same scenario with the axis' own parameters redrawn within training. If training
-  has one value only, there is no such move. Then both arms play the nearest of `LIBRARY_SIZE` other memories: in the
-  training scenario, and in its OOD twin.
+  has one value only, there is no such move. Then both conditions play the nearest of `LIBRARY_SIZE` other memories: in
+  the training scenario, and in its OOD twin.
 * `any_replay`, `any_object_centric`: success if any of the `LIBRARY_SIZE` memories solves the scenario. None of them is
   the twin's own. The control is the training twin, which none of them remembers either.
 """
@@ -150,7 +150,7 @@ def _baselines(
     Args:
         own: records of memories in their own training scenarios.
         any_id: records of the library in training scenarios.
-        twins: records of the twins in both arms.
+        twins: records of the twins in both conditions.
         any_ood: records of the library in OOD twins.
     """
     again = [r["again"] for r in own if r.get("again") is not None]
@@ -181,7 +181,8 @@ def _play_own(task: Task, _: str, seed: int, index: int) -> dict[str, Any]:
 
 
 def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
-    """A twin's own memory, or the nearest one, in both arms. `here` is None if there is no memory or no OOD twin."""
+    """A twin's own memory, or the nearest one, in both conditions. `here` is None if there is no memory or no OOD
+    twin."""
     trained, memory = recall(task, seed, index)
     moved = varies(task, split)
     record: dict[str, Any] = {"index": index, "moved": moved, "control": None, "here": None}

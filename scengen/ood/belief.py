@@ -96,7 +96,8 @@ def _nearest(task: Task, name: str, value: Value) -> Value:
 
 
 def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
-    """Outcomes of the planners in both arms. An arm is None if it is infeasible or the oracle does not solve it."""
+    """Outcomes of the planners in both conditions. A condition is None if it is infeasible or the oracle does not solve
+    it."""
     record: dict[str, Any] = {"index": index, "control": None, "here": None, "reasons": {}}
     try:
         trained, here = task.draw(ID, seed, index).scenario, task.draw(split, seed, index).scenario
@@ -116,7 +117,7 @@ def _play_twin(task: Task, split: str, seed: int, index: int) -> dict[str, Any]:
 
 
 def _play(task: Task, scenario: Scenario, planner: Scenario) -> str | None:
-    """Why a planner fails in a scenario; None if it solves it."""
+    """Reason why a planner fails in a scenario; None if it solves it."""
     if planner == scenario:
         return None  # its beliefs are right, so it is the oracle, which has solved the scenario
     rollout = run(

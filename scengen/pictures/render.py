@@ -32,7 +32,7 @@ State = NDArray[np.float64]
 """State of a world, see `World.state`."""
 
 SHADOW_MAP_SIZE = 1024
-"""Edge of the shadow map [pixels]. MuJoCo's 4096 looks hardly better, and a picture takes 1.6 times as long without a
+"""Edge of the shadow map [pixels]. MuJoCo's 4096 gives almost the same picture, which takes 1.6 times as long without a
 graphics card."""
 MIN_ADDRESS_SPACE = 2.5e9
 """Address space that a process needs for its first picture [bytes]: OpenGL in software takes 2.2 GB, most of it for the

@@ -1,4 +1,4 @@
-"""The contact sheet: pictures of the scenarios of pools, beside their training twins, in one HTML file."""
+"""The contact sheet: pictures of the scenarios of pools, next to their training twins, in one HTML file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """Several pools as one: a folder with a pool for each task and split, and an index of their names and hashes.
 
 Every command that takes several pools also takes such a folder. Its index may be of unknown origin, like a pool:
-it can name folders beside it, and nothing else.
+it can name neighbouring folders, and nothing else.
 """
 
 import json
@@ -68,7 +68,7 @@ def _read_index(folder: Path) -> dict[str, str]:
         if not found or len(found) > MAX_POOLS:
             raise ValueError(f"{len(found)} pools; 1 to {MAX_POOLS} are read")
         if strange := [name for name in found if not re.fullmatch(r"[\w+@=,\[\]-][\w.+@=,\[\]-]*", name)]:
-            raise ValueError(f"{cut(repr(strange[0]))} is not the name of a folder beside it")
+            raise ValueError(f"{cut(repr(strange[0]))} is not the name of a folder next to it")
     except (ValueError, KeyError, TypeError, AttributeError, OSError) as error:
         why = " ".join(str(error).split())[:160]
         raise PoolError(f"{path} is damaged; name the pools themselves, or generate them again ({why})") from None

@@ -168,7 +168,7 @@ def check_robot(embodiment: str, witness: np.ndarray) -> None:
 
 
 def arrow_type(kind: Any, size: int) -> pa.DataType:
-    """How Arrow stores values of a field.
+    """Arrow type of the values of a field.
 
     Args:
         kind: type of the field. Mappings are stored as JSON text.

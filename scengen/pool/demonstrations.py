@@ -79,7 +79,7 @@ class DemonstrationConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class DemonstrationManifest:
-    """What a folder of demonstrations says of itself."""
+    """Manifest of a folder of demonstrations."""
 
     config: DemonstrationConfig
     n: int

@@ -38,10 +38,10 @@ def sha256_of_opened(file: BufferedReader) -> str:
 
 @dataclass(frozen=True)
 class FileEntry:
-    """What a manifest says of a file with rows."""
+    """Entry of a manifest for a file with rows."""
 
     file: str
-    """Name of the file, which lies beside the manifest."""
+    """Name of the file, which is in the folder of the manifest."""
     rows: int
     bytes: int
     sha256: str
@@ -67,10 +67,10 @@ class Identity:
 
 
 def why_damaged(folder: Path, entry: FileEntry, identities: dict[Path, Identity]) -> str:
-    """What is wrong with a file; empty if nothing is.
+    """Fault of a file; empty if nothing is.
 
     Args:
-        entry: what the manifest beside the file says of it.
+        entry: the file's entry in the manifest of its folder.
         identities: identities of the files that were compared so far, to which this one is added.
     """
     path = folder / entry.file
@@ -103,7 +103,7 @@ def replace_file(path: Path, content: bytes) -> None:
 
 
 def read_json_file(path: Path) -> Any:
-    """Content of a JSON file beside the shards: a manifest, or an index.
+    """Content of a JSON file in the folder of the shards: a manifest, or an index.
 
     Raises:
         ValueError: it is not a plain file, too large, or not strict JSON.

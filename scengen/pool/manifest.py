@@ -1,4 +1,4 @@
-"""What a pool says of itself: `manifest.json`, read from data of unknown origin and checked."""
+"""The manifest of a pool: `manifest.json`, read from data of unknown origin and checked."""
 
 import json
 import re
@@ -69,7 +69,7 @@ class RunConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """What a pool says of itself."""
+    """Manifest of a pool."""
 
     config: RunConfig
     n: int
@@ -277,7 +277,7 @@ def check_entry(entry: FileEntry) -> None:
 
 
 def _check_attack(attack: Mapping[str, Any]) -> None:
-    """What `scengen.attack.campaign.store_in_pool` writes, as far as it is read again."""
+    """Check the entries that `scengen.attack.campaign.store_in_pool` writes and that are read again."""
     for name in ("rates", "hits"):
         listed = attack.get(name)
         demand(isinstance(listed, list) and len(listed) <= MAX_HITS, f"attack.{name} is not a list")

@@ -72,8 +72,8 @@ def find(text: str, known: Known, name: Callable[[int], Name], where: str) -> in
     if not found:
         raise NoScenario(text, nearest(start, known.alike(start)), _listed(range(len(known)), name), where)
     if len(found) > 1:
-        message = f"{cut(repr(text))} starts {len(found)} ids in {where}; give more characters: {_listed(found, name)}"
-        raise BadConfig(message)
+        message = f"{cut(repr(text))} is a prefix of {len(found)} ids in {where}; give more characters"
+        raise BadConfig(f"{message}: {_listed(found, name)}")
     if before and not str(called := name(found[0])).startswith(f"{before}/"):
         message = f"{cut(text)} is {called}: the id counts, the text before it is wrong"
         warnings.warn(message, Misnamed, stacklevel=3)

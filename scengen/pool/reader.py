@@ -82,7 +82,7 @@ class Reader:
 
     @cached_property
     def _footer(self) -> Callable[[int], tuple[pq.FileMetaData, list[int]]]:
-        """What a file says of its groups of rows, and the place in it behind the last row of each."""
+        """Metadata of a file about its groups of rows, and the place in it behind the last row of each."""
 
         @lru_cache(KEPT_FOOTERS)
         def footer(number: int) -> tuple[pq.FileMetaData, list[int]]:

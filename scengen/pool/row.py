@@ -25,7 +25,7 @@ NO_WITNESS: NDArray[np.float32] = np.zeros((0, ACTION), np.float32)
 class SceneRow:
     """Columns of every row: a scenario with recorded actions.
 
-    Each field is a column: its type says how Arrow stores the column, and the function beside the type reads it.
+    Each field is a column: its type says how Arrow stores the column, and the function next to the type reads it.
     """
 
     id: Annotated[str, matching(ID)]

@@ -20,7 +20,7 @@ from .shards import Shard
 
 
 class StoredManifest(Protocol):
-    """What every manifest has."""
+    """Entries of every manifest."""
 
     @property
     def config(self) -> Any:
@@ -54,7 +54,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
     MANIFEST: ClassVar[str]
     """Name of the manifest's file."""
     REMEDY: ClassVar[str]
-    """How the rows are made again, for errors."""
+    """Command that makes the rows again, for errors."""
 
     @cached_property
     def _home(self) -> Path:
@@ -193,7 +193,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         return self.at(self.directory.find(name, self.name_at, str(self.folder)))
 
     def _rows_of_file(self, entry: FileEntry | None) -> Iterator[AnyRow]:
-        """The rows of a file beside the shards; none if there is no such file."""
+        """The rows of a file in the folder of the shards; none if there is no such file."""
         return map(self._row, Reader([] if entry is None else [self._shard(entry)]).rows(self._names()))
 
     def _names(self, witness: bool = True) -> tuple[str, ...]:
@@ -215,5 +215,5 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         return Shard(self._home / entry.file, entry.rows, self._identities, layout(self.ROW))
 
     def __getstate__(self) -> dict[str, Any]:
-        """What goes to another process: where the rows are, and not what was read of them."""
+        """State for another process: where the rows are, and not what was read of them."""
         return {f.name: getattr(self, f.name) for f in fields(self)}

@@ -216,7 +216,7 @@ def _check_unchanged(shard: Shard, content: BufferedReader) -> None:
 
 
 def read_footer(shard: Shard) -> tuple[pq.FileMetaData, list[int]]:
-    """What a file says of its groups of rows, and the place behind the last row of each.
+    """Metadata of a file about its groups of rows, and the place behind the last row of each.
 
     Raises:
         PoolError: as `read_rows`.

@@ -21,7 +21,8 @@ from ..installation import ROBOSUITE, cache_folder
 VARIABLE = "SCENGEN_ROBOSUITE"
 """Environment variable that names a folder with robosuite, or robosuite's folder, or its folder models/assets."""
 ASSETS = "robosuite/models/assets"
-"""Folder of robosuite's MJCF files and meshes in its distribution. Names of the robot's files are paths in it."""
+"""Folder of robosuite's MJCF files and meshes in its distribution. The names of the robot's files are relative to this
+folder."""
 INSTALL = f"pip install --no-deps robosuite=={ROBOSUITE}"
 """Command that installs robosuite without its requirements, which reading its files does not need."""
 DOWNLOAD = "python -m scengen.robots.download"
@@ -34,9 +35,9 @@ class Place:
 
     folder: Path
     label: str
-    """What the folder is, in an error."""
+    """Description of the folder in errors."""
     remedy: str
-    """What to do if a file in the folder is missing or another one."""
+    """Remedy if a file in the folder is missing or differs."""
 
 
 @cache

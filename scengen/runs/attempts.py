@@ -15,8 +15,8 @@ from ..work.targets import refused
 from .journal import Journal, Record
 
 MAX_LOST = 100
-"""Number of attempts in a row that crash or reach a limit, at which a run ends: of a sound family hardly one in a
-hundred does."""
+"""Number of attempts in a row that crash or reach a limit, at which a run ends: fewer than one in a hundred attempts of
+a sound family does."""
 
 Progress = Callable[[int, int, Mapping[str, int], Mapping[str, int]], None]
 """Called with the numbers of successes and of finished attempts, and the numbers of attempts by verdict and of
@@ -35,7 +35,7 @@ class Attempt(Protocol):
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a run is to make, and how far it may go for it."""
+    """Target of a run, and the limit of its attempts."""
 
     verdict: str
     """Verdict of a success."""

@@ -53,7 +53,7 @@ NONE_INFEASIBLE: dict[str, int] = {}
 
 
 class Journal:
-    """Records of one run in an SQLite file beside the pool, or another folder of rows. One writer at a time."""
+    """Records of one run in an SQLite file next to the pool, or another folder of rows. One writer at a time."""
 
     def __init__(
         self,

@@ -32,12 +32,12 @@ ORIGINS = ("defaults", "defaults-tree", "searchpath", "config")
 
 @cache
 def conf_dir() -> Path:
-    """The folder of configuration files: inside an installed package, beside it in a checkout."""
+    """The folder of configuration files: inside an installed package, next to it in a checkout."""
     return shipped("conf")
 
 
 def shipped(name: str) -> Path:
-    """A folder that comes with scengen: inside an installed package, beside it in a checkout.
+    """A folder that comes with scengen: inside an installed package, next to it in a checkout.
 
     Raises:
         BadConfig: the folder is missing.
@@ -106,7 +106,7 @@ def splits(name: str, search: Sequence[str] = ()) -> tuple[str, ...]:
 
 
 def facts_file(name: str, search: Sequence[str] = ()) -> Path | None:
-    """The file with the questions and sub-goals of a task, `facts/<task>.yaml` beside the folder of its task file.
+    """The file with the questions and sub-goals of a task, `facts/<task>.yaml` next to the folder of its task file.
 
     None if it has none.
     """
@@ -122,7 +122,7 @@ def conf_of(name: str, search: Sequence[str] = ()) -> Path | None:
 
 
 def behaviour_file(name: str, search: Sequence[str] = ()) -> Path:
-    """The file with the stored behaviour of a task, `behaviour/<task>.json` beside the folder of its task file.
+    """The file with the stored behaviour of a task, `behaviour/<task>.json` next to the folder of its task file.
 
     Raises:
         UnknownName: there is no such task.

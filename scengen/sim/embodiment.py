@@ -1,4 +1,4 @@
-"""Embodiments: the robots that a task may ask for, by the hands of their arms, and scenes with a robot added."""
+"""Embodiments: the robots that a task may require, by the hands of their arms, and scenes with a robot added."""
 
 from collections.abc import Callable
 from itertools import product
@@ -30,7 +30,7 @@ EMBODIMENTS = (
     *("+".join(hands) for arms in range(1, MAX_ARMS + 1) for hands in product(HANDS, repeat=arms)),
     *(f"{driven}+{SCRIPTED}{partner}" for driven, partner in product(HANDS, repeat=MAX_ARMS)),
 )
-"""Robots that a task may ask for: the hands of its arms, joined by `+`. Two arms stand side by side, the first one on
+"""Robots that a task may require: the hands of its arms, joined by `+`. Two arms stand side by side, the first one on
 the right. A scripted arm comes last."""
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Style:
-    """How the moves of `scengen.skills` differ from those of a certificate, which have no style.
+    """Deviation of the moves of `scengen.skills` from those of a certificate, which have no style.
 
     A style changes no plan: it changes how the hand gets to where the plan sends it. Moves read it as `world.style`.
     """

@@ -56,7 +56,7 @@ class Shown:
 
 @dataclass
 class Built:
-    """What a run has done."""
+    """Work that a run has done."""
 
     made: list[str] = field(default_factory=list)
     """Tasks whose films and pictures were made."""

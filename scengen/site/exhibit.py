@@ -1,4 +1,4 @@
-"""What the site shows of a task: films, pictures and pairs of twins, made once and stored beside a description."""
+"""Content of the site about a task: films, pictures and pairs of twins, made once and stored with a description."""
 
 import hashlib
 import json
@@ -111,7 +111,7 @@ class Ending:
 
 @dataclass(frozen=True)
 class Exhibit:
-    """What was made for a task."""
+    """Files that were made for a task."""
 
     key: str
     """Hash of what it was made from."""
@@ -120,7 +120,7 @@ class Exhibit:
     category: str
     instruction: str
     hands: str
-    """Hands of the robot, in words."""
+    """Hands of the robot, as text."""
     axes: list[str]
     """Names of the axes."""
     words: str
@@ -200,7 +200,7 @@ def make(task: Task, rows: Sequence[PoolRow], folder: Path, key: str, progress: 
 
 
 def hands_in_words(embodiment: str) -> str:
-    """The hands of a robot in words: `suction and jaw`."""
+    """The hands of a robot as text: `suction and jaw`."""
     return embodiment.replace("panda_", "").replace("_", " ").replace("+", " and ")
 
 
@@ -274,7 +274,7 @@ def _drawn(task: Task, splits: Sequence[str]) -> tuple[int, list[Draw]]:
 
 
 def _endings(row: PoolRow, check: str) -> list[Ending]:
-    """How the plans that must fail have failed, by the certificate, which may be a stranger's."""
+    """Failures of the plans that must fail, by the certificate, which may be untrusted."""
     found = []
     for numbers in (each.numbers for each in row.certificate.checks if each.name == check):
         for plan, outcomes in numbers.items():

@@ -26,7 +26,7 @@ HOLD = 1.5
 """Time for which the last frame stands before the film starts again [s]."""
 EXPOSURE = 0.7
 """Factor on colours, under which light things keep them in viser's own lights. Lights of ours would be lost when the
-film starts again: the player then leaves its own ones in the scene for good (viser 1.1.1)."""
+film starts again: the player then never removes its own ones from the scene (viser 1.1.1)."""
 SCRIPT = """<script>
 {
   const film = new URLSearchParams(location.search).get("film") ?? "";

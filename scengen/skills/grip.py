@@ -58,7 +58,7 @@ def take(arm: Arm, body: str, above: float = 0.10, lift: float = 0.12) -> Plan:
 def best_grip(arm: Arm, body: str) -> Grip | None:
     """The narrowest grasp of an object as it lies now; among equal ones the one that turns the hand least.
 
-    A style may choose any of the grasps that are hardly wider. None if the object is too wide in every direction.
+    A style may choose any of the grasps that are slightly wider. None if the object is too wide in every direction.
     """
     found, style = grips(arm.world, body), arm.world.style
     if style and found:

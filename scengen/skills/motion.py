@@ -1,6 +1,6 @@
 """Moves of one arm. Each yields actions, one per control period, until a condition on the world holds.
 
-A move steers the hand by feedback: the action asks for the velocity of a setpoint that moves along a straight line,
+A move steers the hand by feedback: the action commands the velocity of a setpoint that moves along a straight line,
 plus a correction towards it. Positions in [m], speeds in [m/s], orientations as 3 x 3 matrices. A move takes the arm
 that it steers; `together` joins the moves of several arms.
 """

@@ -60,7 +60,7 @@ def approach(ahead: Vec3, speed: float, share: float = 1.0, rate: float = APPROA
 
 @dataclass(frozen=True)
 class Manner:
-    """How one straight move is carried out. Without a style: at its pace, at once, and straight."""
+    """Parameters of one straight move. Without a style: at its pace, at once, and straight."""
 
     pace: Pace
     """Pace of the move."""

@@ -14,7 +14,7 @@ from .server import Guard, close_server, new_token, open_server
 
 @dataclass(frozen=True)
 class Content:
-    """What the studio shows."""
+    """Content of the studio."""
 
     shelf: Shelf | None
     """Pools to browse; None without pools."""
@@ -78,7 +78,7 @@ class Studio:
 
 
 class Page:
-    """What one browser shows. Two browsers look at different things."""
+    """Page of one browser. Two browsers look at different things."""
 
     def __init__(self, client: viser.ClientHandle, content: Content):
         client.camera.position, client.camera.look_at = CAMERA, LOOK_AT

@@ -1,4 +1,4 @@
-"""Browsing: a scenario beside its training twin, its certificate, and its witness and shortcuts played in 3-D."""
+"""Browsing: a scenario next to its training twin, its certificate, and its witness and shortcuts played in 3-D."""
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +20,7 @@ from .player import Player
 from .scene import FAULTS, SceneView, filmed, one_line
 
 TWIN_OFFSET: Vec3 = np.array([0.0, 1.4, 0.0])
-"""Position of the training twin beside the scenario [m]: the table is 0.8 m wide."""
+"""Position of the training twin, at the side of the scenario [m]: the table is 0.8 m wide."""
 LABEL_OFFSET: Vec3 = np.array([0.0, 1.4, 1.3])
 """Position of the label of the training twin [m], above its table."""
 CAMERA: Vec3 = np.array([0.9, -0.75, 1.45])
@@ -193,7 +193,7 @@ class Browser:
             self._place.value = pool.directory.find(text, pool.name_at, str(pool.folder)) + 1
 
     def _description(self, row: PoolRow, best: str) -> str:
-        """What the scenario is, in words and units; texts of the pool are escaped."""
+        """Description of the scenario with units; texts of the pool are escaped."""
         task, sampler = self.task, self.pool.manifest.config.sampler
         words = [f"task={row.task}", f"split={row.split}", f"seed={row.seed}", f"index={row.index}"]
         if sampler != "iid":

@@ -129,7 +129,7 @@ class Driver:
         self.session: Session | None = None
         """The latest take; None before the first one."""
         self.told: list[str] = []
-        """Results of the takes, in words."""
+        """Results of the takes, as text."""
         self.turned = turns_pictures(source.task.family)
         """Whether a policy may see the scenarios turned or mirrored; then pages show a picture of what it sees."""
         self._eye: Eye | None = None
@@ -203,13 +203,13 @@ class Shown:
     line: StateLine
     poses: Poses
     told: str
-    """Result of the latest take, in words."""
+    """Result of the latest take, as text."""
     picture: Picture | None
-    """What a policy sees, if its pictures may be turned."""
+    """Picture that a policy sees, if its pictures may be turned."""
 
 
 class DrivePage:
-    """What one browser shows of the takes. A separate thread sends, so that the control loop does not wait."""
+    """Page of the takes in one browser. A separate thread sends, so that the control loop does not wait."""
 
     def __init__(self, client: viser.ClientHandle, driver: Driver):
         self._client, self._view = client, SceneView(client.scene, "/drive")

@@ -146,7 +146,7 @@ class Judge:
         self._describe()
         try:
             self._load(episode)
-        except FAULTS as error:  # its report must be seen all the same
+        except FAULTS as error:  # its report must still be seen
             told = f"it cannot be replayed: {one_line(error)}"
             self.player.outcome.content = template("studio_fault.html").render(fault=told)
 

@@ -58,7 +58,7 @@ class Film:
     frames: NDArray[np.float32]
     """Poses, shape (frames, bodies, 7)."""
     outcome: str
-    """What became of the episode, in words."""
+    """Result of the episode, as text."""
 
     @property
     def seconds(self) -> float:
@@ -140,7 +140,7 @@ class SceneView:
         for body, parts in meshes.items():
             if not parts:
                 continue
-            # Nodes have numbers for names: those of a stranger's bodies could hold anything, such as slashes.
+            # Nodes have numbers for names: those of untrusted bodies could hold anything, such as slashes.
             self._frames[body] = self._api.add_frame(
                 f"{self._root}/{body}", show_axes=False, position=poses[body, :3], wxyz=poses[body, 3:]
             )
@@ -176,7 +176,7 @@ Simplification = Callable[[trimesh.Trimesh], trimesh.Trimesh]
 
 
 def _simplification(world: World, body: int) -> Simplification:
-    """How meshes of a body are simplified: things keep their shapes."""
+    """Method that simplifies the meshes of a body: things keep their shapes."""
     if body not in world.own:
         return partial(_rounded, grid=GRID)
     return partial(_rounded, grid=PEDESTAL_GRID) if PEDESTAL in world.model.body(body).name else _with_fewer_triangles

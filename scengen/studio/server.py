@@ -1,7 +1,7 @@
 """The web server of the studio: viser's, behind a token.
 
 viser has no hook for requests and answers everyone. Its server is therefore opened with `websockets.serve` replaced by
-one that asks for the token first. The token is the first part of every path: viser's page derives the address of its
+one that checks the token first. The token is the first part of every path: viser's page derives the address of its
 websocket from its own, so that requests of both kinds have it, without cookies, which other servers on this machine
 would see.
 """
@@ -30,7 +30,7 @@ what could run in spite of escaping still reaches no other host."""
 HEADERS = {"Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff", "Cache-Control": "no-store"}
 """Further headers of every answer. The address holds the token, which must go to no other page."""
 SHARING = ("ShareUrlRequest", "ShareUrlDisconnect")
-"""Messages with which viser's page asks for a public tunnel; they are not answered."""
+"""Messages with which viser's page requests a public tunnel; they are not answered."""
 Socket = Callable[[ServerConnection], Awaitable[None]]
 """Function that serves a websocket."""
 

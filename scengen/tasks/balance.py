@@ -22,7 +22,7 @@ Decisions where the paper (App. B, T31 and T32) is silent:
 * A rod that is released and tips by more than 10 deg is lost. So is one that stood on the ridge by itself for 0.1 s and
   is touched again: a hand that opens a little, sees the rod tip and catches it would find the place by trial.
 * A rod that falls from more than 6 mm is lost: a rod that is aligned and dropped from 60 mm stays up on 12 mm. The
-  paper asks for a release on the ridge, and lacks these three rules.
+  paper requires a release on the ridge, and lacks these three rules.
 """
 
 import math

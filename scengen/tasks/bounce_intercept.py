@@ -225,7 +225,7 @@ class BounceIntercept(LaunchedBall):
         yield require(met is not None, late, speed=self.speed, hand=HAND_SPEED)
         until = [way for way in ways if way.starts < (met[1] if met else math.inf)]
         nearest = min(*(float(placed.inside(way.at)[0]) for way in until[1:]), *map(placed.end_distance, until))
-        # In a corner two walls return the ball one after the other or at once, each a part of the velocity of its own.
+        # In a corner two walls return the ball one after the other or at once, each a separate part of the velocity.
         yield require(nearest >= width, "the ball meets the end of a wall", nearest=max(nearest, -1.0), near=width)
 
     def features(self) -> Mapping[str, float]:

@@ -1,4 +1,4 @@
-"""What the two tasks with a cracker box and a slot share (T08, T09): the scene, its tolerances, and positions in it."""
+"""Base of the two tasks with a cracker box and a slot (T08, T09): the scene, its tolerances, and positions in it."""
 
 import math
 from functools import cached_property

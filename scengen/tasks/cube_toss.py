@@ -34,8 +34,8 @@ Decisions, where the paper (App. B, T10) is silent or contradicts itself:
 
 In every period the oracle predicts where the cube would come down if released now. It steers that place instead of the
 hand, by swinging at the speed that carries the cube from where it is now into the tray, until the place stays in the
-middle. Then it opens the jaw. This corrects noise and a cube that is held off the middle. The moment of release hardly
-matters: if the jaw opens 0.1 s earlier or later, the cube lands within 1 cm of the same place.
+middle. Then it opens the jaw. This corrects noise and a cube that is held off the middle. The moment of release has
+little influence: if the jaw opens 0.1 s earlier or later, the cube lands within 1 cm of the same place.
 """
 
 import math

@@ -15,7 +15,7 @@ Decisions:
 
 * "The target": one red slab, which stands across the lanes of all chains but one. Five straight chains cannot end at a
   slab as wide as a tile without standing in each other's way.
-* "The wrong target": the outermost chain on one side leads to a blue slab of its own, which never counts. So colour
+* "The wrong target": the outermost chain on one side leads to a separate blue slab, which never counts. So colour
   identifies this chain and nothing else.
 * Each scene has one chain of each of the paper's defects (gap, drift, wrong target) and a fourth with a gap or a drift.
 * One try: the robot may touch one first tile and nothing else, and may topple it but not carry it; anything else ends
@@ -216,8 +216,8 @@ class DominoSelect(Scenario):
         yield within_reach("a first tile", *(start + self.starter.height * UP for start in starts))
 
     def features(self) -> Mapping[str, float]:
-        """How far tiles lean when they strike, the space between chains, by how much chains fail (0: none does), and
-        how far to push [rad].
+        """Ratios that decide at which angle tiles strike, the space between chains, how much chains fail (0: none
+        does), and tipping angles [rad].
         """
         return {
             "gap_over_height": self.gap / self.tile.height,

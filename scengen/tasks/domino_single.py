@@ -168,7 +168,7 @@ class DominoSingle(Scenario):
         yield within_reach("the first tile", self.spot(0) + self.starter.height * UP)
 
     def features(self) -> Mapping[str, float]:
-        """How far a tile leans when it strikes the next one, what the last one must move, and how far to push [rad]."""
+        """Gap over height, mass of the slab over that of a tile, and tipping angle of the first tile [rad]."""
         return {
             "gap_over_height": self.gap / self.tile.height,
             "slab_over_tile_mass": self.slab.mass / self.tile.mass,

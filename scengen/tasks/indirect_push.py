@@ -15,7 +15,7 @@ Decisions, where the paper (App. B, T20) is silent or cannot be taken literally:
 * The paper's chain connects "the target to the goal zone", where it would stand in the target's way. Here it stands
   between hand and target, in line with the zone.
 * Out of reach. The arm swings about a shoulder 0.445 m above the table, and a band before the far edge is beyond it. It
-  is deep enough for target, zone and the way between them only towards the corners: hence the bearing near 20 deg.
+  is deep enough for target, zone and the way between them only towards the corners, which gives the bearing: 20 deg.
   Scenarios are refuted unless *no part of the gripper* can touch the target in any posture (`ik.GRIPPER_REACH`).
 * One block must not be enough: the zone starts beyond what the arm at full stretch reaches with one, by the triangle
   inequality and without search. Two are enough in training. If the zone is farther or the blocks are smaller, three are

@@ -16,8 +16,8 @@ Decisions, where the paper (App. B, M02) is silent, or contradicts itself (one a
 
 * The agent is the right arm, as in every episode of the paper, and acts with 7 numbers. The left arm is part of the
   scene: events move it by a law of memory and poses alone, so that an episode can be saved, restored and repeated. It
-  types in its turn when the agent's hand is `MIN_CLEARANCE` beside the keyboard, then goes home to its own side. If the
-  agent comes back before the letter counts, the partner turns round and waits again.
+  types, when it is its turn, if the agent's hand is `MIN_CLEARANCE` beside the keyboard, then goes home to its own
+  side. If the agent comes back before the letter counts, the partner turns round and waits again.
 * The partner pauses before each of its turns, for a time that is unknown to the agent. An agent whose hand stays beside
   the keyboard for `TURN_LIMIT` in its own turn has let its turn go by, and the episode ends. The paper has neither. The
   two close turn-taking by the clock, without a look at the partner or at the bold letters: the best fixed wait fits a
@@ -165,7 +165,7 @@ class KeyboardTyping(Scenario):
         yield from self.make_room(world)
 
     def type_own(self, world: World, end: int) -> Plan:
-        """Type the own letters before place `end` of the word, each in its turn."""
+        """Type the own letters before place `end` of the word, each when it is its turn."""
         for k in [k for k in self.own if k < end]:
             yield from self.await_turn(world, k)
             yield from self.press(world, k)

@@ -143,7 +143,7 @@ class LaunchedBall(Scenario):
         yield from stay(arm, at, rot, ends, grip=OPEN)
 
     def catch(self, world: World) -> Plan:
-        """Close the jaw and lift what is in it."""
+        """Close the jaw and lift its content."""
         yield from grasp(world.arm)
         yield from retreat(world.arm)
 

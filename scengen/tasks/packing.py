@@ -12,8 +12,8 @@
 Bottleneck: no slot is visible. Positions and quarter turns of all pieces depend on each other, and one wrong piece
 comes to lie on the others. Suction grips only from above: no piece can be turned over. The assignment of pieces to
 slots is drawn for each scene, and half of the cuts are mirrored: one memorised arrangement is right in one scene of
-twelve, or in 10 to 14 %, because some pieces are alike. Within an arrangement the lengths hardly matter to a compliant
-hand: walls and neighbours push a piece in that is half a unit off.
+twelve, or in 10 to 14 %, because some pieces are alike. Within an arrangement the lengths have little influence on a
+compliant hand: walls and neighbours push a piece in that is half a unit off.
 
 Decisions, where the paper (App. B, T33) says no more than "L-shaped pieces", "bin" and "zero gaps":
 
@@ -213,7 +213,7 @@ class Packing(Scenario):
         }
 
     def _place_all(self, world: World, pose: Callable[[int], tuple[Vec3, float]]) -> Plan:
-        """Press each piece down softly at a pose and let go, at whatever place results."""
+        """Press each piece down softly at a pose and let go there."""
         for i in range(self.count):
             lies = partial(self.lies, world, i)
             yield from fitting.lay(world.arm, f"piece_{i}", self.face(i), *pose(i), self.thickness, lies)

@@ -298,7 +298,7 @@ class PendulumGrasp(Scenario):
     # --- geometry -------------------------------------------------------------------------
 
     def _seen_at_start(self) -> str:
-        """Where the bob is at the start, in words; below the axle within 4 deg, where pictures do not show the side."""
+        """Place of the bob at the start, as text; below the axle within 4 deg, where pictures do not show the side."""
         angle, _ = self.pendulum.swing(self.peak_angle, self.phase / 360.0)
         below = abs(angle) < math.radians(4.0)
         return "below the axle" if below else spoken(self.plane + (0.0 if angle > 0.0 else 180.0))

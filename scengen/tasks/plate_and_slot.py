@@ -1,4 +1,4 @@
-"""What the two tasks with a plate and a shelf share (T05, T06): the scene, the goal, and how a held plate is put in.
+"""Base of the two tasks with a plate and a shelf (T05, T06): the scene, the goal, and how a held plate is put in.
 
 * A plate that falls faster than 0.35 m/s, as from 6 mm, breaks, and the episode is lost. No hand lowers anything faster
   than 0.3 m/s. Speeds are checked every 10 ms, in which a fall gains 0.1 m/s: from 10 mm on it is seen for certain.

@@ -94,7 +94,7 @@ class PlateShelfHobi(PlateAndSlot[Dish]):
         return Strict("the plate was raised without being pressed") if self.raised_unpressed(world) else None
 
     def raised_unpressed(self, world: World) -> bool:
-        """Whether a hand raises the plate that has not been turned yet by a hand on the side that goes down."""
+        """Whether a hand raises the plate before another hand has turned it by pressing the opposite side."""
         middle, normal, tilt = world.pos("plate"), world.rot("plate")[:, 2], world.tilt("plate")
         if tilt > PRESSED_SHARE * self.plate.slope:
             return False

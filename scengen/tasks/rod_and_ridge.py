@@ -1,4 +1,4 @@
-"""What the tasks with a rod and a ridge share (T31, T32 and X1): the scene, and where things stand in it."""
+"""Base of the tasks with a rod and a ridge (T31, T32 and X1): the scene, and where things stand in it."""
 
 import math
 from typing import Generic, TypeVar

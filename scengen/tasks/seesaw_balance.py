@@ -13,7 +13,7 @@ of the balancing place, which can be anywhere on an arm of 0.36 m. Chance, for a
 how masses are distributed: the best single guess levels the deck in 7 % of training, one of three guesses in 19 %.
 Weighing the counterweight alone does not help. A hand with a sense of force finds the place without a trial in half of
 training: it presses the raised arm down until the deck is level, and weighs the counterweight (docs/cheats.md). So the
-task asks for a torque balance, by trial or by feel.
+    task requires a torque balance, by trial or by force.
 
 Decisions where the paper is silent (it gives the story, the 5 deg, the pivot offset and the mass of the beam):
 

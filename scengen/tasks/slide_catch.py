@@ -53,7 +53,7 @@ BLOCK_COUNT = 3  # blocks on the ramp, and lanes
 ORDERS = tuple(permutations(range(BLOCK_COUNT)))
 """Lanes, counted from the left, of the lowest, the middle and the highest block."""
 LANE_NAMES = ("in the left lane", "in the middle lane", "in the right lane")
-"""Lanes in words, counted from the left."""
+"""Lanes as text, counted from the left."""
 FRICTION_TOLERANCE = 0.10  # share by which a block's friction may differ from its known value: jitter of certificates
 FALL_TIME = 0.16  # time from a block's middle over the lip to in the bin [s]; it tips first. Measured: 0.13 to 0.17
 VISIBLE_SLIDE = 0.002  # distance after which a block is seen to slide [m]

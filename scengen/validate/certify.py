@@ -60,10 +60,10 @@ def certify(
         settings: settings of the checks.
         embodiment: the robot, one of `scengen.sim.embodiment.EMBODIMENTS`.
         last: the check after which to stop, if only this check is of interest; nothing is certified then.
-        adversary: attacks the scenario if the settings ask for it: `scengen.attack.check.attacked`.
+        adversary: attacks the scenario if the settings request it: `scengen.attack.check.attacked`.
 
     Raises:
-        BadConfig: the settings ask for an attack, and there is no adversary.
+        BadConfig: the settings request an attack, and there is no adversary.
     """
     if settings.attack and adversary is None:
         what = f"certify.attack = {settings.attack}, but no adversary is given"

@@ -18,7 +18,7 @@ from ..scenario import Scenario
 
 
 def check_versions(made: Mapping[str, str], where: str) -> None:
-    """Refuse a pool that was certified with another MuJoCo or robosuite than the installed one.
+    """Refuse a pool that was certified with a MuJoCo or robosuite that differs from the installed one.
 
     Raises:
         PoolError: one of them differs.

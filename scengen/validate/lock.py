@@ -1,4 +1,4 @@
-"""scengen.lock beside a pool: versions of the packages that its verdicts were made with, in the format of pip.
+"""scengen.lock in the folder of a pool: versions of the packages that its verdicts depend on, in the format of pip.
 
 It repeats what the manifest says, which counts, and adds the packages that the manifest does not name. Like a pool it
 may be of unknown origin: only its lines about packages that the code of a verdict imports are ever used.
@@ -78,7 +78,7 @@ def lock_of_run(folder: Path, family: type[Scenario], made: Mapping[str, Any]) -
         write(folder / LOCK_FILE, lock_text(family, **made))
     elif other := [f"{name} {version}" for name, version in begun.items() if here.get(name) != version]:
         install = f"pip install --no-deps -r {folder / LOCK_FILE}"
-        raise PoolError(f"{folder} was begun with {', '.join(other)}; {install}, or choose another pool=")
+        raise PoolError(f"{folder} was started with {', '.join(other)}; {install}, or choose another pool=")
     return (folder / LOCK_FILE).read_text()
 
 

@@ -63,7 +63,7 @@ def world_of(scenario: Scenario, embodiment: str = JAW) -> World:
 def portable_sha256(text: str) -> str:
     """Hash of a scene that is the same on machines with different rounding: numbers count to 9 digits, and to 1e-9.
 
-    A number within rounding of the middle between two such values can differ all the same. Scenes have thousands of
+    A number within rounding of the middle between two such values can still differ. Scenes have thousands of
     numbers, and rounding changes one in some thousand millions of them so.
     """
     words = []
@@ -87,7 +87,7 @@ def _rounded(word: str) -> str:
 
 
 def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> str:
-    """How the scene of a pool differs from the rebuilt one, in words; empty if it does not.
+    """Difference between the scene of a pool and the rebuilt one, as text; empty if it does not.
 
     Args:
         exact: whether every byte must be equal, as on a machine with the same rounding. Otherwise every element and

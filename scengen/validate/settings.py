@@ -32,7 +32,7 @@ class Robust:
 
 @dataclass(frozen=True)
 class CertifySettings:
-    """Settings of all checks. Units are given beside the numbers in conf/certify/quick.yaml."""
+    """Settings of all checks. Units are given next to the numbers in conf/certify/quick.yaml."""
 
     name: str = "quick"
     overlap: float = 0.001

@@ -42,7 +42,7 @@ Otherwise it replaces `LOOPBACK` by the address of the machine, and listens on a
 CONNECT_TIMEOUT = 5.0
 """Time in which an address must answer [s]."""
 MAX_WORKERS = 10_000
-"""Largest number of workers that can be asked for."""
+"""Largest number of workers that can be requested."""
 WRONG_TOKEN = "InvalidAuthToken"
 """Word that Ray repeats before it gives up, if a token is missing or is not that of the cluster."""
 QUIET = {

@@ -191,7 +191,7 @@ class _Workers:
         return [*self.idle, *self.working]
 
     def start(self, nodes: Nodes, count: int | None) -> None:
-        """Start workers, each on the node with most free cores, until there are as many as asked for.
+        """Start workers, each on the node with most free cores, until the requested number is reached.
 
         Args:
             count: number of workers; None for one on each core.
@@ -275,7 +275,7 @@ class Crew:
             function: the pickled function.
             count: number of workers; None for one on each core.
             announced: see `Nodes`.
-            report: called with the number of nodes and workers, in words.
+            report: called with the number of nodes and workers, as text.
         """
         self._ray, self._count, self._report = ray, count, report
         reference = ray.put(function)

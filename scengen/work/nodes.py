@@ -48,7 +48,7 @@ def code_sha256() -> str:
     parts = []
     for root, pattern in ((Path(__file__).parents[1], "*.py"), (conf_dir(), "*.yaml")):
         names = {path.relative_to(root): path for path in root.rglob(pattern)}
-        beside = ("conf", "task_template")  # folders that are in an installed package, and beside it in a checkout
+        beside = ("conf", "task_template")  # folders that are in an installed package, and next to it in a checkout
         shipped = (name for name in names if name.parts[0] not in beside)
         parts += [f"{name} {hashlib.sha256(names[name].read_bytes()).hexdigest()}" for name in sorted(shipped)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()

@@ -24,7 +24,7 @@ EXIT_TIMEOUT = 1.0
 
 
 MAX_LATENESS = 0.5
-"""Delay after which a look at a worker shows that this process was suspended, or hardly ran [s]."""
+"""Delay after which a look at a worker shows that this process was suspended, or got almost no processor time [s]."""
 MIN_SHARE = 0.01
 """Share of a core below which a worker that is not suspended does nothing."""
 MIN_LOOK = 0.05

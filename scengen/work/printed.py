@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.text import Text
 
 _CONTROL = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
-"""Unicode categories of characters that a terminal acts upon, reorders text by, or cannot show."""
+"""Unicode categories of characters that a terminal acts on, reorders text by, or cannot show."""
 
 
 def printable(text: str, lines: bool = False) -> str:

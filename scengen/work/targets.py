@@ -31,13 +31,13 @@ _REMEDY = {
     errno.EIO: "the disk has a fault; choose another place",
     errno.ELOOP: "its links form a circle; choose another place",
     errno.EMFILE: "raise the limit of open files (ulimit -n), or use fewer workers",
-    errno.ENOMEM: "use fewer workers, or ask for less at once",
+    errno.ENOMEM: "use fewer workers, or process less at once",
     errno.EAGAIN: "use fewer workers",
 }
 
 
 def remedy(error: OSError) -> str:
-    """Fault and remedy in words, without the path; empty if the fault is not one of disks."""
+    """Fault and remedy as text, without the path; empty if the fault is not one of disks."""
     known = _REMEDY.get(error.errno or 0)
     return f"{(error.strerror or 'fault').lower()}; {known}" if known else ""
 

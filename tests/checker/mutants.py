@@ -64,7 +64,7 @@ FREE: dict[str, dict[str, str]] = {
     },
     "full": {},
 }
-"""By level and pattern: what may be changed, in words."""
+"""By level and pattern: what may be changed, as text."""
 
 
 def leaves(value: Any, path: Path_ = ()) -> Iterator[tuple[Path_, Any]]:
@@ -97,7 +97,7 @@ class Mutator:
         self.draft, self.random = draft, random.Random(seed)
 
     def lie(self) -> tuple[str, Draft]:
-        """What was changed, in words, and the pool."""
+        """What was changed, as text, and the pool."""
         pick, draft = self.random, copy.deepcopy(self.draft)
         tops: dict[str, Any] = {"manifest": draft.manifest, **{f"row{k}": row for k, row in enumerate(draft.rows)}}
         top = pick.choice(list(tops) * 2 + ["manifest"])

@@ -87,7 +87,7 @@ def test_the_bytes_do_not_depend_on_workers_or_interruptions(made, tmp_path, wor
     settings, task, checks = read_task("demos", given, DemosSettings)
     with pytest.raises(KeyboardInterrupt):
         generate_demonstrations(task, checks, settings, stop)
-    with pytest.raises(PoolError, match="a run was begun there; repeat its command"):
+    with pytest.raises(PoolError, match="a run was started there; repeat its command"):
         Demonstrations.open(folder)
     generate_demonstrations(task, checks, settings, lambda *_: None)
     for path in made.iterdir():

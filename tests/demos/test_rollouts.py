@@ -71,7 +71,7 @@ def test_a_prefix_of_several_ids_names_no_rollout(tmp_path, capsys):
     start = next(a for a, b in pairwise(sorted(row.id[0] for row in Demonstrations.open(folder).attempts())) if a == b)
     capsys.readouterr()
     assert cli.run(["show", "film", f"pool={folder}", f"id={start}", f"to={tmp_path / 'film.png'}"]) == 2
-    assert f"'{start}' starts 2 ids in {folder}" in capsys.readouterr().err
+    assert f"'{start}' is a prefix of 2 ids in {folder}" in capsys.readouterr().err
 
 
 def test_kept_rollouts_replay_bit_for_bit(kept, capsys):

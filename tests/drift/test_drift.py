@@ -113,7 +113,7 @@ def test_a_row_that_is_none_is_unknown_and_no_flip(made):
     row = next(made.rows())
     other = replace(row, witness=np.zeros_like(row.witness))
     found = asdict(Judge(task, settings, "recheck")(other))
-    assert "the witness has another sha256" in found["unknown"] and not found["checks"]
+    assert "the witness has a different sha256" in found["unknown"] and not found["checks"]
 
 
 def test_level_full_makes_every_check_but_one_that_was_not_asked_for(made):

@@ -124,7 +124,7 @@ FAULTS = {
     "error": "the server reports an error: ",
     "garbage": "a message is not msgpack",
     "pickle": "an array in a message has the type '|O'",
-    "large": "an array in a message has another number of bytes",
+    "large": "an array in a message has a different number of bytes",
     "deep": "a message is not msgpack",
 }
 

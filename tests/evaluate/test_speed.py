@@ -1,4 +1,4 @@
-"""Measurements of cost: sides work by turns, and the report says when the machine was busy."""
+"""Measurements of cost: sides work in turn, and the report says when the machine was busy."""
 
 import time
 

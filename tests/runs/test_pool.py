@@ -284,8 +284,8 @@ def foreign_task(row):
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
-        (flip_scene, "the scene has another sha256"),
-        (flip_witness, "the witness has another sha256"),
+        (flip_scene, "the scene has a different sha256"),
+        (flip_witness, "the witness has a different sha256"),
         (flip_params, "the id does not belong to the parameters"),
         (drop_a_parameter, "the parameters are incomplete"),
         (forge_witness, "check witness cannot have passed"),

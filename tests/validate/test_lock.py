@@ -141,7 +141,7 @@ def test_a_run_is_not_continued_with_other_packages(made, tmp_path, capsys):
     assert cli.run(again) == 0
     other(tmp_path / "pool.run", "numba", "0.50.0")
     capsys.readouterr()
-    assert cli.run(again) == 2 and "was begun with numba 0.50.0" in capsys.readouterr().err
+    assert cli.run(again) == 2 and "was started with numba 0.50.0" in capsys.readouterr().err
 
 
 def test_a_subset_keeps_the_file(made, tmp_path):

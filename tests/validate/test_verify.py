@@ -365,7 +365,7 @@ MANIFEST = {
     "unknown level": (lambda m: m["config"]["certify"].update(name="strict"), "called 'strict'"),
     "more than was done": (lambda m: m["config"]["certify"]["robust"].update(runs=14), "check robust was made"),
     "rejects": (lambda m: m["funnel"].update(robust=5), "the funnel differs"),
-    "subset": (lambda m: m.update(subset={"of": "0" * 64, "chosen": "by hand"}, n=5), "the subset has another number"),
+    "subset": (lambda m: m.update(subset={"of": "0" * 64, "chosen": "by hand"}, n=5), "subset has a different number"),
 }  # fmt: skip
 
 

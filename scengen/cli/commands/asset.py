@@ -147,7 +147,7 @@ def _report(figures: dict[str, Any]) -> int:
 
 
 def _about_sides(figures: dict[str, Any]) -> str:
-    """Which axis of the file points up and why, and the side on which the asset stands after the drop."""
+    """The axis of the file that points up, the reason, and the side on which the asset stands after the drop."""
     given, rest = figures["settings"]["up"], figures["rest"]
     is_gltf = figures["input"]["file"].lower().endswith(".glb")
     why = "as given" if given else "as glTF defines" if is_gltf else "the default; give up=AXIS if it is another one"

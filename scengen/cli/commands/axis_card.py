@@ -32,7 +32,7 @@ def command(arguments: Arguments) -> int:
 
 
 def _result(baseline: Baseline) -> str:
-    """Success of one baseline, in words."""
+    """Success of one baseline, as text."""
     if not (baseline.training and baseline.here and baseline.excess):
         return baseline.finding
     excess = baseline.excess

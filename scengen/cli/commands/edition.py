@@ -49,7 +49,7 @@ def command(arguments: Arguments) -> int:
 
 
 def _differences(edition: Edition, keys: list[str]) -> list[str]:
-    """What this version draws otherwise in some sets."""
+    """Differences between the draws of this version and some sets."""
     found = []
     with ProgressBar(err, f"check edition {edition.name}", len(keys)) as progress_bar:
         for done, key in enumerate(keys, 1):

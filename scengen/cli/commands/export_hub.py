@@ -69,6 +69,6 @@ def command(arguments: Arguments) -> int:
 
 
 def _verification(report: Report) -> str:
-    """The verification of a pool in words."""
+    """The verification of a pool as text."""
     sample = f", {report.sample['size']} simulated" if report.sample else ""
     return f"level {report.level}{sample}"

@@ -37,7 +37,7 @@ REASON_LENGTH = 90
 REMEDIES = {
     "was not seen to its end": "leave to_rest out if something never rests, or a rule ends it; see CONTRIBUTING.md",
 }
-"""What the author of a task can do about a reason, by words of it. Certificates hold reasons without remedies."""
+"""Advice for the author of a task, by words of a rejection reason. Certificates hold reasons without remedies."""
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ def command(arguments: Arguments) -> int:
 
 
 SUFFIXES = (".md", ".py", ".toml", ".yaml")
-"""Suffixes of the files of the template. Files of Python and test tools beside them are not copied."""
+"""Suffixes of the files of the template. Files of Python and test tools next to them are not copied."""
 
 
 def _names(task: str, package: str) -> dict[str, str]:

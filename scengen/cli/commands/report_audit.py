@@ -60,7 +60,7 @@ def _table(among: Sequence[Redrawn]) -> dict[str, np.ndarray]:
 
 
 def _verdict(stage: str, found: Bias) -> str:
-    """The result of a stage in words."""
+    """The result of a stage as text."""
     if found.accepted == found.proposed:
         return f"{stage}: all of them, so there is no selection bias"
     found_in = f"selection bias in {', '.join(found.flagged)}" if found.flagged else "no sign of selection bias"

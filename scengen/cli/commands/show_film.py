@@ -73,7 +73,7 @@ def check_format(target: Path, frames: int, fps: int, width: int, height: int) -
     elif frames * width * height > MAX_STRIP_PIXELS:
         size = f"{frames} frames of {width} x {height} pixels"
         raise BadConfig(
-            f"{size} are more than {MAX_STRIP_PIXELS / 1e6:g} million pixels; ask for fewer or smaller ones"
+            f"{size} are more than {MAX_STRIP_PIXELS / 1e6:g} million pixels; request fewer or smaller ones"
         )
 
 

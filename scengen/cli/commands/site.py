@@ -1,4 +1,4 @@
-"""write a web site of tasks: films in three dimensions, axes beside training, figures"""
+"""write a web site of tasks: films in three dimensions, axes next to training, figures"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

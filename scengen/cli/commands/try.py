@@ -229,7 +229,7 @@ def _played(stage: Stage, settings: TrySettings) -> tuple[Rollout, Take, str]:
 
 
 def _end(rollout: Rollout, world: World, gave_up: str) -> str:
-    """Where a plan gave up, or where the hands are at the end of an episode that is not a success."""
+    """Place where a plan gave up, or places of the hands at the end of an episode that is not a success."""
     return gave_up if gave_up or rollout.solved else f"at the end {'; '.join(_hands(world))}"
 
 
@@ -245,7 +245,7 @@ def _moment(world: World, error: GaveUp) -> str:
 
 
 def _hands(world: World) -> list[str]:
-    """Where each hand is, and what its arm touches."""
+    """Position of each hand, and the bodies that its arm touches."""
     parts = []
     for arm in world.arms:
         whose = f"the hand of arm {arm.number}" if len(world.arms) > 1 else "the hand"

@@ -64,7 +64,7 @@ class Subject:
 
     @property
     def moves(self) -> NDArray[np.bool_]:
-        """Whether the action of each row asks each arm for a motion, shape (rows, arms)."""
+        """Whether the action of each row commands a motion of each arm, shape (rows, arms)."""
         return asks_for_motion(self.column("action"))
 
 
@@ -184,7 +184,7 @@ def states(subject: Subject) -> Iterator[Finding]:
         if longest > FROZEN_FRAMES:
             where = (first, first + longest - 1)
             yield found(
-                "FROZEN_STATE", "the state does not change while the action asks for motion", where, rows=longest
+                "FROZEN_STATE", "the state does not change while the action commands motion", where, rows=longest
             )
 
 

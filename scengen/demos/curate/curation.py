@@ -71,7 +71,7 @@ class Curated:
 
     @property
     def uncompared(self) -> bool:
-        """Whether a camera has pictures and none of a replay beside them: OpenGL is missing, or every replay failed."""
+        """Whether a camera has pictures and none of a replay to compare: OpenGL is missing, or every replay failed."""
         made = {check for report in self.reports for check in report.checks}
         return "replay" in made and any(comparison_of(camera) not in made for camera in self.recording.cameras)
 

@@ -1,4 +1,4 @@
-"""What the checks of an episode find: findings, the report of an episode, and its JSON schema."""
+"""Findings of the checks of an episode: findings, the report of an episode, and its JSON schema."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass

@@ -1,4 +1,4 @@
-"""What people say of the episodes of a recording: the tables of scores and decisions, read and written."""
+"""Judgements of people about the episodes of a recording: the tables of scores and decisions, read and written."""
 
 import csv
 import io

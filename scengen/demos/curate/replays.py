@@ -41,7 +41,7 @@ DERIVED = (*INDEX_FEATURES, STATE, "action", CONTROL_ACTIONS, "waiting")
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a replay needs of an episode; it goes to another process."""
+    """Data of an episode that a replay needs; it goes to another process."""
 
     number: int
     task: Task
@@ -134,7 +134,7 @@ def difference(read: NDArray[np.float64], stored: NDArray[np.float32]) -> float:
 
 @dataclass(frozen=True)
 class Replayed:
-    """What the replay of an episode finds."""
+    """Findings of the replay of an episode."""
 
     findings: tuple[Finding, ...] = ()
     checks: tuple[str, ...] = ("replay",)
@@ -219,7 +219,7 @@ def _wrong_results(recorded: Recorded, row: int, over: Outcome | None) -> str:
 
 
 class _Films:
-    """The films of an episode beside pictures of its replay. Without OpenGL none is compared."""
+    """The films of an episode compared with pictures of its replay. Without OpenGL none is compared."""
 
     def __init__(self, recorded: Recorded, scenario: Scenario, world: World, stack: ExitStack):
         self._held, self._camera = scenario.orientation, None
@@ -254,7 +254,7 @@ class _Films:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What the comparison of all rows has found."""
+        """Result of the comparison of all rows."""
         shifts = [one for key, told in self._differences.items() for one in compared(key, told)]
         still = [key for key, ends in self._ends.items() if stands_still(ends[0], ends[-1])]
         return (*shifts, *(one for key, one in self._frozen.items() if key not in still))

@@ -62,7 +62,7 @@ class TaskStats:
     paper_seconds: float | None
     """Mean length of the paper's demonstrations [s]; None for a task that the paper lacks."""
     idle: float
-    """Share of rows whose action asks for no motion."""
+    """Share of rows whose action commands no motion."""
     jerk: float
     """Mean of the episodes' jerk, see `score.terms_of` [m/s3]."""
     path_ratio: float

@@ -32,7 +32,7 @@ class Timing:
         return float(np.quantile(values, share)) if values else 0.0
 
     def told(self) -> str:
-        """The figures in words."""
+        """The figures as text."""
         late, reaction = (1000 * self.quantile(name, 0.95) for name in ("late", "reaction"))
         return (
             f"{len(self.late)} control periods; 95 % started within {late:.2f} ms of their time, "

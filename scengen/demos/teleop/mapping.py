@@ -25,7 +25,7 @@ left stick: forwards, backwards, left, right     shoulder buttons: right up, lef
 right stick: tilt (pitch, roll)                  d-pad left, right: turn (yaw)
 right trigger: close slowly, left trigger: open slowly        A: close or open at once
 """
-"""Controls of the arm in words."""
+"""Controls of the arm as text."""
 
 
 @dataclass(frozen=True)

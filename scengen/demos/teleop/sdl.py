@@ -48,13 +48,13 @@ W S A D: forwards, backwards, left, right    R F: up, down      arrows: tilt    
 C: close slowly, V: open slowly     space: close or open at once     left shift held: no motion
 tab: next arm     backspace: undo one second     return: pause, go on, keep     escape: give up
 """
-"""The keys in words."""
+"""The keys as text."""
 LINE_HEIGHT = 40
 """Height of the state line below the picture [pixels]."""
 
 
 class _Sdl:
-    """What gamepad and keyboard share: SDL's queue of events, which belongs to the process."""
+    """Base of gamepad and keyboard: SDL's queue of events, which belongs to the process."""
 
     paced = True
 

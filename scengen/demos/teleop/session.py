@@ -33,7 +33,7 @@ ENDED: Phase = "ended"
 CONTROLS = f"""{ARM_CONTROLS}\
 B held: no motion (clutch)     Y: next arm     X: undo one second     start: pause, go on, keep     back: give up
 """
-"""All controls in words."""
+"""All controls as text."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class StateLine:
-    """What the person reads beside the picture. Programs that drive get the same and nothing else."""
+    """Text that the person reads next to the picture. Programs that drive get the same and nothing else."""
 
     phase: Phase
     time: float

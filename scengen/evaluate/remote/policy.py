@@ -19,7 +19,7 @@ RATES = ("fps", "control_hz")
 MODALITIES = ("video", "state", "language")
 """Kinds of observations of GR00T, the first parts of the names of entries."""
 MAX_HISTORY = 100
-"""Largest number of past observations that a server may ask for."""
+"""Largest number of past observations that a server may request."""
 
 
 class RemotePolicy:

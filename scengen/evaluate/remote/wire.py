@@ -1,6 +1,6 @@
 """Messages of policy servers: msgpack with arrays, as openpi and GR00T write them. Nothing in a message is executed.
 
-A message comes from a stranger. Its size, the lengths in it, its nesting and the types of its arrays are bounded, and
+Messages are untrusted. Its size, the lengths in it, its nesting and the types of its arrays are bounded, and
 pickled objects, which msgpack-numpy would load, are refused.
 """
 

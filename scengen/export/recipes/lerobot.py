@@ -25,7 +25,7 @@ Value = str | int | float
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a policy is trained."""
+    """Training of a policy."""
 
     origin: str
     """Source of the numbers, as a sentence."""
@@ -134,7 +134,7 @@ class Order:
     recording: Recording
     """The recording."""
     settings: RecipeSettings
-    """What was requested."""
+    """Requested settings."""
 
     @property
     def cameras(self) -> list[str]:

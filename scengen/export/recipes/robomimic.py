@@ -38,7 +38,7 @@ POLICY = "robomimic_scengen.checkpoint:policy"
 
 @dataclass(frozen=True)
 class Data:
-    """What a recipe needs to know of a recording."""
+    """Data of a recording that a recipe needs."""
 
     low: tuple[str, ...]
     """Keys of vectors that the policy sees."""
@@ -86,7 +86,7 @@ def scripts(settings: RecipeSettings) -> Scripts:
 
 
 def _read(path: str) -> Data:
-    """What a recording says of itself.
+    """Description of a recording in its own files.
 
     Raises:
         BadConfig: it has nothing that a policy could see.

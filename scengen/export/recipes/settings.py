@@ -32,7 +32,7 @@ class Scripts:
     origin: str
     """Source of the numbers, as a sentence."""
     install: str
-    """How to install what the scripts need, as a sentence."""
+    """Instruction to install the requirements of the scripts, as a sentence."""
     files: Mapping[str, str]
     """Texts of the files, by name."""
 

@@ -12,7 +12,7 @@ RECIPES: Mapping[str, Callable[[RecipeSettings], Scripts]] = {
     **dict.fromkeys(lerobot.RECIPES, lerobot.scripts),
     robomimic.NAME: robomimic.scripts,
 }
-"""What makes the scripts of each recipe."""
+"""Functions that make the scripts of each recipe."""
 
 
 def write_recipe(settings: RecipeSettings) -> Scripts:

@@ -53,7 +53,7 @@ class Energy:
     """Mean distance of the permutations: the distance of finite samples of equal distributions."""
 
     def __str__(self) -> str:
-        """The distance with its test, in words: `0.42 (by chance 0.11, p = 0.001)`."""
+        """The distance with its test, as text: `0.42 (by chance 0.11, p = 0.001)`."""
         if self.distance == 0.0:
             return "equal"
         return f"{self.distance:.2g} (by chance {self.chance:.2g}, p = {self.pvalue:.2g})"

@@ -1,6 +1,6 @@
 """Hidden parameters that observations reveal: regressions of each hidden parameter on each stream.
 
-A parameter is hidden if no observation may reveal it (`param(hidden=True)`). Poses may reveal it all the same: the tilt
+A parameter is hidden if no observation may reveal it (`param(hidden=True)`). Poses may still reveal it: the tilt
 of a rod that rests on its supports may depend on its centre of mass. Observations are taken at the start and after a
 time without action. A regression is fitted on half of the draws, and its explained variance measured on the other half.
 """

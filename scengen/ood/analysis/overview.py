@@ -55,7 +55,7 @@ class Overview:
     scenarios: int
     """Number of scenarios in the pool."""
     sample: str
-    """Indices to which coverage, bias and histograms refer, in words; empty for all."""
+    """Indices to which coverage, bias and histograms refer, as text; empty for all."""
     funnel: Mapping[str, int]
     """Number of draws that passed each step of certification."""
     reasons: Mapping[str, int]

@@ -57,7 +57,7 @@ def redrawn(
         search: see `task_of`.
 
     Raises:
-        BadConfig: the pool is a chosen subset, which has no proposals of its own.
+        BadConfig: the pool is a chosen subset, which has no proposals.
         PoolError: a scenario differs from that of the pool, there are more draws than the pool counts, or it counts so
             many that no run can have made them.
     """
@@ -117,6 +117,6 @@ def first_scenarios(task: Task, pool: Pool, count: int) -> list[Scenario]:
 
 
 def sampled_indices(pool: Pool) -> str:
-    """The indices that `redrawn` repeats, in words; empty if it repeats all."""
+    """The indices that `redrawn` repeats, as text; empty if it repeats all."""
     indices = pool.manifest.indices
     return f"of the first {MAX_REDRAWN} of {indices} indices" if indices > MAX_REDRAWN else ""

@@ -1,4 +1,4 @@
-"""The confirmation of a box on fresh twins, each beside its controls.
+"""The confirmation of a box on fresh twins, each with its controls.
 
 A search among hundreds of points finds something by chance, so only the confirmation counts. The test is exact and goes
 by twins. A twin's memory is played in some controls and in one scenario outside training. If nothing is special
@@ -19,7 +19,7 @@ from .trial import BREAKS, HOLDS, INFEASIBLE, Place, PlannedTrial, Point, Region
 SEARCH_TWINS = 8
 """Number of training scenarios whose memories are played in the search."""
 FRESH_TWINS = 20
-"""Number of twins in which a box is confirmed, each in a scenario of its own."""
+"""Number of twins in which a box is confirmed, each in a separate scenario."""
 PLACEMENT_TRIES = 20
 """Maximum number of draws within the box until one is feasible in a fresh twin."""
 CONTROLS_PER_TWIN = 3

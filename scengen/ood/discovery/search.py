@@ -100,7 +100,7 @@ class DiscoverSettings:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Findings of a search, and the trials that it spent."""
+    """Findings of a search, and the number of its trials."""
 
     findings: list[Finding]
     """Findings that were confirmed, the smallest p value first."""
@@ -211,7 +211,7 @@ class _SearchRun:
         self.trials: list[SearchTrial] = []
         """Trials in the order in which they ended: with several workers any order."""
         self.spent = 0
-        """Number of trials that the search has asked for."""
+        """Number of trials that the search has requested."""
 
     def __enter__(self) -> "_SearchRun":
         self.log.__enter__()
@@ -289,6 +289,6 @@ class _SearchRun:
         self.spent += len(planned)
 
     def _from(self, begin: int) -> list[SearchTrial]:
-        """The trials from number `begin` on that the search has asked for, by number."""
+        """The trials from number `begin` on that the search has requested, by number."""
         asked = (trial for trial in self.trials if begin <= trial.number < self.spent)
         return sorted(asked, key=lambda trial: trial.number)

@@ -94,9 +94,9 @@ class PlannedTrial:
     number: int
     """Number of the trial in the search."""
     stage: str
-    """Stage of the search that asks for the trial."""
+    """Stage of the search that requests the trial."""
     where: Point | RegionBox
-    """Point that is tried; the box if it is to be confirmed."""
+    """Point of the trial, or the box to be confirmed."""
     twin: int
     """Number of the twin whose memory is played."""
 

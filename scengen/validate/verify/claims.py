@@ -40,7 +40,7 @@ class OfCode(str):
 
 @dataclass(frozen=True)
 class Claims:
-    """What a pool says of all its rows."""
+    """Claims of a pool about all its rows."""
 
     task: Task
     """The task as the manifest describes it, with the installed family."""
@@ -64,7 +64,7 @@ class Claims:
 
     @property
     def of_another_version(self) -> str:
-        """The versions of the task in words, if the pool was certified on another one; empty if not."""
+        """The versions of the task as text, if the pool was certified on another one; empty if not."""
         return self.task.other_version("certified against", self.manifest.task_version)
 
     @cached_property

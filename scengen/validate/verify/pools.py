@@ -32,7 +32,7 @@ MAX_FAULTS = 100
 
 @dataclass(frozen=True)
 class Options:
-    """How a pool is verified."""
+    """Settings of the verification of a pool."""
 
     level: str = "recheck"
     """One of `recheck.LEVELS`."""
@@ -47,7 +47,7 @@ class Options:
     limits: Limits | None = LIMITS
     """Limits of one scenario; None to work in this process."""
     adversary: Adversary | None = None
-    """The adversary at level full, if the certificates ask for an attack; see `certify.certify`."""
+    """The adversary at level full, if the certificates require an attack; see `certify.certify`."""
 
 
 def verify(

@@ -53,7 +53,7 @@ def simulate(
     level: str,
     adversary: Adversary | None = None,
 ) -> Simulated:
-    """Simulate what a level asks for, until a fault is found.
+    """Run the simulations of a level until a fault is found.
 
     Args:
         row: a row whose labels, names and settings are right.
@@ -108,7 +108,7 @@ def fails_again(
 
 
 def certified_here(row: PoolRow, claims: Claims, adversary: Adversary | None) -> str:
-    """What the installed version of the task makes of a scenario that was certified against another one.
+    """Result of a scenario that was certified against another version of its task, under the installed one.
 
     Args:
         adversary: see `certify`.

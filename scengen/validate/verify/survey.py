@@ -80,7 +80,7 @@ def chunks(count: int) -> Iterator[range]:
 
 
 def too_large(manifest: Manifest) -> str:
-    """Why the indices of a pool are not drawn again; empty if they are."""
+    """Reason why the indices of a pool are not drawn again; empty if they are."""
     most = MAX_DRAWS + MAX_DRAWS_PER_ROW * manifest.scenarios
     for count, what in ((manifest.indices, "indices"), (manifest.funnel.get("proposed", 0), "draws")):
         if count > most:
@@ -99,7 +99,7 @@ def patience(scenarios: int, seconds: float) -> float:
 
 
 def too_many(manifest: Manifest, indices: int, proposals: int) -> str:
-    """Why the draws so far contradict the count of a manifest; empty if they do not.
+    """Reason why the draws so far contradict the count of a manifest; empty if they do not.
 
     Args:
         indices: number of indices drawn so far.
@@ -169,7 +169,7 @@ def wrong_subset(manifest: Manifest) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Reject:
-    """What is counted of a scenario that was kept although it was not certified."""
+    """Counts about a scenario that was kept although it was not certified."""
 
     index: int
     reason: str
