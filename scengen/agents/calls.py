@@ -62,7 +62,7 @@ class Calls:
             strict: whether replies must have the asked form exactly, see `replies.read_json`.
 
         Raises:
-            BadConfig: the journal holds something else than calls.
+            BadConfig: the journal contains other things than calls.
         """
         self.log, self.model, self.budget, self.prices, self.strict = log, model, budget, prices, strict
         self.new, self.tokens, self.cost = 0, 0, 0.0
@@ -151,7 +151,7 @@ class Calls:
         return record
 
     def _count(self, told: tuple[int, int], estimated: tuple[int, int]) -> None:
-        """Count a call. What a model does not tell is estimated, so that it does not pass a limit unseen."""
+        """Count a call. Token counts that a model does not report are estimated, so that it does not pass a limit unseen."""
         self.new, self.tokens = self.new + 1, self.tokens + sum(told)
         counted = told if all(told) else estimated
         self._counted += sum(counted)
@@ -162,14 +162,14 @@ def read_calls(path: Path) -> list[dict[str, Any]]:
     """The calls in a journal.
 
     Raises:
-        BadConfig: the file cannot be read, or is no journal.
+        BadConfig: the file cannot be read, or is not a journal.
     """
     try:
         _, *lines = read_plain(path, MAX_JOURNAL).decode().splitlines()
         return _checked([json.loads(line) for line in lines], path)
     except (OSError, ValueError, RecursionError) as error:
         raise BadConfig(
-            f"{cut(str(path))} is no journal of calls ({cut(str(error))}); name the {CALLS} of a run"
+            f"{cut(str(path))} is not a journal of calls ({cut(str(error))}); name the {CALLS} of a run"
         ) from None
 
 
@@ -186,7 +186,7 @@ def _record(record: Any, where: str) -> dict[str, Any]:
             _ = "".join((turn["role"], turn["text"], *turn["pictures"]))
         return {**record, "digest": record["digest"] + "", "reply": asdict(_reply(record["reply"]))}
     except (KeyError, TypeError, ValueError, AttributeError, ScengenError):
-        raise BadConfig(f"{where}, is no call; name the {CALLS} of a run") from None
+        raise BadConfig(f"{where}, is not a call; name the {CALLS} of a run") from None
 
 
 def _reply(plain: Mapping[str, Any]) -> Reply:

@@ -69,7 +69,7 @@ class Endpoint:
 
         Raises:
             RefusedRequest: it refuses this request.
-            ModelError: it cannot be reached, refuses every request, or answers something else than a completion.
+            ModelError: it cannot be reached, refuses every request, or its answer is not a completion.
         """
         began = time.monotonic()
         body = _body(self.name, turns, tools, schema, temperature, seed)
@@ -181,7 +181,7 @@ def reply_of(answer: Any) -> Reply:
     """The reply in a completion.
 
     Raises:
-        KeyError, IndexError, TypeError, ValueError, AttributeError: it is no completion.
+        KeyError, IndexError, TypeError, ValueError, AttributeError: it is not a completion.
     """
     choice = answer["choices"][0]
     message, usage = choice["message"], answer.get("usage")
@@ -193,7 +193,7 @@ def reply_of(answer: Any) -> Reply:
     refusal = _clean(message.get("refusal")) or refusal
     thought = _clean(message.get("reasoning_content") or message.get("reasoning"))
     counts = [tokens(_entry(usage, name)) for name in ("prompt_tokens", "completion_tokens")]
-    notes = ("usage that is no number of tokens is ignored",) if None in counts else ()
+    notes = ("usage that is not a number of tokens is ignored",) if None in counts else ()
     ended = "" if found else _ended(choice.get("finish_reason"), text, refusal, thought)
     return Reply(text, found, counts[0] or 0, counts[1] or 0, 0.0, ended, notes)
 
@@ -231,7 +231,7 @@ def _entry(usage: Any, name: str) -> Any:
 
 
 def tokens(given: Any) -> int | None:
-    """A number of tokens; 0 if it is not told, None if it is no number of tokens."""
+    """A number of tokens; 0 if it is missing, None if it is not a number of tokens."""
     if given is None:
         return 0
     if isinstance(given, bool) or not isinstance(given, (int, float)):
@@ -240,7 +240,7 @@ def tokens(given: Any) -> int | None:
 
 
 def _wait(asked: str | None, tried: int) -> float:
-    """Wait before the next try [s]: what the server asks for, in seconds or until a date, else 1, 2, 4 s and so on."""
+    """Wait before the next try [s]: what the server requests, in seconds or until a date, else 1, 2, 4 s and so on."""
     seconds = 2.0 ** (tried - 1)
     if asked and re.fullmatch(r"[0-9]{1,9}(\.[0-9]{1,9})?", asked):
         seconds = float(asked)

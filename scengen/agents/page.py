@@ -21,7 +21,7 @@ SHOWN = 200
 def write_page(
     folder: Path, results: Sequence[Mapping[str, Any]], model: str, priors: Mapping[str, Mapping[str, Prior]]
 ) -> Path:
-    """Write `report.html` into the folder of a run; pictures stay beside it. Returns its path."""
+    """Write `report.html` into the folder of a run; pictures stay in the same folder. Returns its path."""
     calls = read_calls(folder / CALLS)
     by_exam: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
     for call in calls:

@@ -25,7 +25,7 @@ MAX_ANSWER = 16_000_000
 
 @dataclass
 class Refusal(Exception):
-    """An answer with an HTTP status that is no success."""
+    """An answer with an HTTP status that is not a success."""
 
     status: int
     """HTTP status code."""
@@ -62,7 +62,7 @@ def post(url: str, body: Mapping[str, Any], key: str, timeout: float) -> Any:
         timeout: time limit of the request and the whole answer [s].
 
     Raises:
-        Refusal: the server answers with another status than a success.
+        Refusal: the server answers with a status that is not a success.
         Broken: there is no answer, or it is cut short, too large, too slow, or not JSON.
     """
     headers = {"Content-Type": "application/json"} | ({"Authorization": f"Bearer {key}"} if key else {})

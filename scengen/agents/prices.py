@@ -1,4 +1,4 @@
-"""Prices of models: what a run costs, in whatever currency they are given."""
+"""Prices of models: what a run costs, in the currency in which they are given."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -13,7 +13,7 @@ from .models import Reply
 
 T = TypeVar("T")
 METADATA = "metadata"
-"""Name of the evidence that is no frame: instruction, robot, controller and readings."""
+"""Name of the evidence that is not a frame: instruction, robot, controller and readings."""
 LISTS = ("answer", "evidence", "objects", "before", "after")
 """Entries of replies that are lists of words."""
 MAX_OBJECTS = 100

@@ -1,4 +1,4 @@
-"""Counts of a folder of demonstrations, made again: attempts without a row are made anew."""
+"""Recounting a folder of demonstrations: attempts without a row are made again."""
 
 import time
 from collections import Counter
@@ -19,7 +19,7 @@ from ..work.typed import typed
 from .generate import APART, CHEAP_CHECKS, GIVEN_UP, STEPS, Job, funnel, outcomes
 
 MAX_AGAIN = 10_000
-"""Largest number of attempts without a row that are made again, beside `MAX_AGAIN_PER_ROW`."""
+"""Largest number of attempts without a row that are made again, in addition to `MAX_AGAIN_PER_ROW`."""
 MAX_AGAIN_PER_ROW = 20
 """Further attempts that are made again for each demonstration: the default limit of a run."""
 GIVEN_UP_KEY = f"solved: {GIVEN_UP}"

@@ -350,12 +350,12 @@ class _Verification:
         if manifest.checks is not None:
             claimed.append("own settings of the checks before the oracle plays")
         if manifest.source != POLICY and len(recount.kept) < manifest.n:
-            claimed.append(f"{manifest.n} demonstrations were asked for, and the run ended with {len(recount.kept)}")
+            claimed.append(f"{manifest.n} demonstrations were requested, and the run ended with {len(recount.kept)}")
         claimed += _author(manifest, oracle)
 
 
 def _author(manifest: DemonstrationManifest, oracle: bool) -> list[str]:
-    """Claims about whoever drove the robot."""
+    """Claims about the driver of the robot."""
     if manifest.source == POLICY:
         return [f"policy {manifest.policy!a} drove the robot", "no rollout of it was left out"]
     if manifest.source == TELEOP:

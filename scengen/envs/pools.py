@@ -35,7 +35,7 @@ def rows_of(pool: Folders | Library[PoolRow] | None, task: str) -> Library[PoolR
 
 
 def located(pool: Folders | Library[PoolRow] | None) -> Folders | Library[PoolRow] | None:
-    """Folders by their absolute paths, which hold wherever a process goes or starts."""
+    """Folders by their absolute paths, which hold in every process and working folder."""
     if isinstance(pool, (str, Path)):
         return Path(pool).absolute()
     return pool if pool is None or isinstance(pool, Library) else [Path(each).absolute() for each in pool]

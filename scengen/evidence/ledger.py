@@ -95,7 +95,7 @@ def opened(folder: str | None, search: Sequence[str] = ()) -> Iterator[None]:
 
 
 def folder_of(task: str) -> Path:
-    """Folder of the ledger about a task: `records` beside the folder of its task file, as in another package.
+    """Folder of the ledger about a task: `records` next to the folder of its task file, as in another package.
 
     For scengen's own tasks, and for those that exist no more, it is the ledger that comes with scengen.
     """
@@ -134,7 +134,7 @@ def latest(kind: Kind, task: str, **made_with: Any) -> dict[str, Evidence]:
 
 
 def write(row: Evidence) -> None:
-    """Add a row to the ledger. It replaces the row of the same place, whatever version that is about."""
+    """Add a row to the ledger. It replaces the row of the same place, of any version."""
     path = folder_of(row.task) / row.kind / f"{row.task}.jsonl"
     path.parent.mkdir(parents=True, exist_ok=True)
     with _locked(path.parent):

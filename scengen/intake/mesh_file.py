@@ -34,7 +34,7 @@ PLY_TYPES = {
 PLY_ORDERS = {b"ascii": "", b"binary_little_endian": "<", b"binary_big_endian": ">"}
 """Byte orders of the formats of PLY files; empty for text."""
 MAX_STL_NAME = 1000
-"""Largest length of the first line of an STL file in text [bytes], after which its first triangle begins."""
+"""Largest length of the first line of an STL file in text [bytes], after which its first triangle starts."""
 PLY_CORNERS = ("vertex_indices", "vertex_index")
 """Names of the property that lists the corners of a polygon."""
 

@@ -93,7 +93,7 @@ class LeakSearches(_Searches):
         [split] = job.splits
         found = asdict(leaks(job.task, split, self.options["n"], SEED))
         value = {name: found[name] for name in ("hidden", "found")}
-        words = f"{len(value['hidden'])} hidden parameters, observations tell {len(value['found'])}"
+        words = f"{len(value['hidden'])} hidden parameters, observations reveal {len(value['found'])}"
         return Result(job, [Row(split, found["draws"], value)], words)
 
 

@@ -27,7 +27,7 @@ from .policies import POLICIES, REPLAY, UNTRAINED
 CERTIFIED = ("certified", "oracle", "robosuite")
 """Titles of the figures of certification."""
 BASELINES = (*MOTION, *OBJECT_CENTRIC, *BELIEF)
-"""Baselines that have a column of their own."""
+"""Baselines with a separate column."""
 TITLES = [name.replace("object_centric", "object-centric").replace("_", " ") for name in BASELINES]
 """Titles of their columns."""
 AXIS = (
@@ -149,7 +149,7 @@ def baselines(task: Task) -> dict[str, dict[str, Baseline]]:
 def learners(task: Task) -> dict[str, Baseline]:
     """Success of one trained policy on the axes on which it was played, over all its trainings.
 
-    It is the policy that solves most training scenarios, so that its failures elsewhere tell most; of several, the
+    It is the policy that solves most training scenarios, so that its failures elsewhere show most; of several, the
     first one of `LEARNERS`.
     """
     known = ledger.current("baseline", task.name)

@@ -35,7 +35,7 @@ AGAIN = (1, 2)
 REPLAY = "replay"
 """Policy that replays the witness of the nearest other training scenario."""
 UNTRAINED = ("idle", "random", "oracle")
-"""Policies that are played in training alone: a certificate tells how they do on an axis."""
+"""Policies that are played in training alone: a certificate shows their results on an axis."""
 SCENARIOS = 20
 """Number of scenarios of each split."""
 DEMONSTRATIONS = 200
@@ -182,7 +182,7 @@ class Baselines(_OfPolicies):
 
 
 def _solved(name: str, rows: Iterable[Row]) -> str:
-    """Number of scenarios that a policy solves on each split, in words."""
+    """Number of scenarios that a policy solves on each split, as text."""
     counts = (f"{row.value['solved']} of {row.n} in {row.split}" for row in rows)
     return f"{name} solves {', '.join(counts)}"
 

@@ -190,7 +190,7 @@ def _check(manifest: DemonstrationManifest) -> None:
     demand(manifest.operator is None or manifest.policy is None, "an operator and a policy")
     for source, stated in ((TELEOP, manifest.operator), (POLICY, manifest.policy)):
         demand((stated is None) == (source not in config.styles), f"style {source} and its source go together")
-        demand(source not in config.styles or len(config.styles) == 1, f"{source} stands beside other styles")
+        demand(source not in config.styles or len(config.styles) == 1, f"{source} cannot be mixed with other styles")
     demand((manifest.failed is None) == (not config.keep), f"keep= and {FAILED} go together")
     if manifest.failed is not None:
         demand(manifest.failed.file == FAILED, f"failed names a different file than {FAILED}")

@@ -23,7 +23,7 @@ def sha256_of_file(path: Path) -> str:
     """Hash of a file, in hex.
 
     Raises:
-        ValueError: it is no plain file.
+        ValueError: it is not a plain file.
         OSError: it cannot be read.
     """
     with open_plain(Path(os.path.realpath(path))) as file:

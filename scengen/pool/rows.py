@@ -58,7 +58,7 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
 
     @cached_property
     def _home(self) -> Path:
-        """The folder, wherever the process goes afterwards."""
+        """The folder, also after the process has changed its working folder."""
         return self.folder.absolute()
 
     def __post_init__(self) -> None:

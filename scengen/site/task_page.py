@@ -34,7 +34,7 @@ def page(task: Task, measured: Figures, films: Path | None = None) -> str:
     Args:
         task: the task.
         measured: figures of its axes, as from `measures.figures.axes`.
-        films: folder that `scengen site` has written, as it lies beside the pages.
+        films: folder that `scengen site` has written, relative to the pages.
     """
     made = Exhibit.read(films / "tasks" / task.name) if films else None
     return "\n".join(
@@ -147,7 +147,7 @@ def parameters(task: Task) -> Iterator[str]:
 
 
 def _axes(task: Task, made: Exhibit | None, measured: Figures) -> Iterator[str]:
-    """A section for every axis: its distributions, its pictures beside training, and its figures."""
+    """A section for every axis: its distributions, its pictures compared with training, and its figures."""
     yield from _heading("OOD axes", (), "axes")
     pairs = {pair.axis: pair for pair in made.pairs} if made else {}
     for axis in task.axes.values():

@@ -1,4 +1,4 @@
-"""Files that a stranger may have put in place: what is opened at all, and how much of it is read."""
+"""Files of unknown origin: what is opened at all, and how much of it is read."""
 
 import errno
 import os

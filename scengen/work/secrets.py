@@ -1,4 +1,4 @@
-"""Keys of servers: they are in environment variables, go where a user says, and are told nowhere."""
+"""Keys of servers: they are in environment variables, go where a user says, and are shown nowhere."""
 
 import difflib
 import os
@@ -13,7 +13,7 @@ def secret(setting: str, name: str) -> str:
     """The key in an environment variable; empty if no variable is named.
 
     Raises:
-        BadConfig: there is none, or no header may hold it. A key in place of its name is not told.
+        BadConfig: there is none, or no header may hold it. A key in place of its name is not shown.
     """
     if not name:
         return ""

@@ -370,5 +370,5 @@ def test_prices_are_two_numbers_or_a_file(tmp_path):
 def test_a_journal_of_a_stranger_is_read_as_data(line, tmp_path):
     (tmp_path / "calls.jsonl").write_text(f"{{}}\n{line}\n")
     given = settings(tmp_path / "to", None, model=f"transcript:{tmp_path / 'calls.jsonl'}")
-    with pytest.raises(BadConfig, match=r"journal|is no call"):
+    with pytest.raises(BadConfig, match=r"journal|is not a call"):
         run(given, lambda *_: None)

@@ -57,5 +57,5 @@ def test_the_command_prints_leaks(monkeypatch, capsys, tmp_path):
     assert cli.run(["attack", "task=seesaw_balance", "n=1", "tiers=[leaks]", f"json={target}"]) == 0
     assert "target.mass" in [leak["parameter"] for leak in json.loads(target.read_text())["leaks"]["found"]]
     told = capsys.readouterr()
-    assert "hidden parameters in 60 draws of id: observations tell" in told.out
+    assert "hidden parameters in 60 draws of id: observations reveal" in told.out
     assert "LEAK" in told.err and "reveals target.mass: explained variance" in told.err

@@ -186,7 +186,7 @@ def twice_failed(m: Manifest, rows: list[Any], failures: list[Any]) -> None:
 
 DEMONSTRATIONS: dict[str, tuple[str, Forge, str]] = {
     "removed": ("demonstrations", without(1), "rows and reasons give 3 attempts, not 4"),
-    "removed at the end": ("demonstrations", without(-1), "4 demonstrations were asked for, and the run ended with 3"),
+    "removed at the end": ("demonstrations", without(-1), "4 demonstrations were requested, and the run ended with 3"),
     "counted as failed": ("demonstrations", hidden, "made again, attempts without a row fail for other reasons"),
     "second runs removed": ("demonstrations", first_runs, "rows and reasons give 2 attempts, not 3"),
     "shortest kept": ("demonstrations", shortest, "made again|rows and reasons give"),
@@ -198,7 +198,7 @@ DEMONSTRATIONS: dict[str, tuple[str, Forge, str]] = {
     "an invented reason": ("demonstrations", manifest(reasons={"rest: it moved": 2}), "the funnel differs"),
     "other outcomes": ("demonstrations", manifest(outcomes={"success": 3, "failure": 2}), "other outcomes"),
     "nothing at all": ("demonstrations", nothing, "nothing to judge"),
-    "more asked for": ("demonstrations", manifest(n=200), "200 demonstrations were asked for|run ends"),
+    "more asked for": ("demonstrations", manifest(n=200), "200 demonstrations were requested|run ends"),
     "a failure left out": ("failures", dropped, "does not hold"),
     "a failure twice": ("failures", doubled, "occurs twice|does not count"),
     "another reason": ("failures", reason, "replayed it is"),

@@ -85,7 +85,7 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
     write_json(str(folder / f"table-{settings.stage}.json"), about)
     page = write_page(folder, found.results, settings.model, found.priors)
     cost = "" if found.cost is None else f", cost {found.cost:.4g}"
-    say(f"{found.calls} new calls, {found.tokens} tokens{cost}; wrote {page} and tables beside it")
+    say(f"{found.calls} new calls, {found.tokens} tokens{cost}; wrote {page} and its tables")
     if found.refused:
         count = len(found.refused)
         remark(f"{count} scenarios are in no table, as requests were refused; the last one: {found.refused[-1]}")

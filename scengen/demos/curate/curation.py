@@ -118,7 +118,7 @@ def curate(settings: CurateSettings, progress: Callable[[int, int], None], searc
 def _examined(
     recording: Recording, settings: CurateSettings, search: Sequence[str], progress: Callable[[int], None]
 ) -> tuple[list[EpisodeReport], list[Recorded], Whole]:
-    """Reports with the scores of the measured terms, what is to be replayed, and what stands beside the rows."""
+    """Reports with the scores of the measured terms, what is to be replayed, and the findings about the other files."""
     whole = Whole(recording)
     reports, jobs, terms, tasks, solved = [], list[Recorded](), list[dict[str, float]](), list[str](), list[bool]()
     twins: dict[str, int] = {}

@@ -23,25 +23,25 @@ DRAWN = ("id", "shifted", "id_twin", "params")
 """Columns that follow from split, seed and index."""
 
 
-def wrong_labels(told: Mapping[str, Any], task: Task, scenario: Scenario, text: str) -> Iterator[Finding]:
+def wrong_labels(stored: Mapping[str, Any], task: Task, scenario: Scenario, text: str) -> Iterator[Finding]:
     """Findings about the columns of an episode.
 
     Args:
-        told: row of the table of episodes.
+        stored: row of the table of episodes.
         text: scene that is built from the parameters.
     """
     for name in EPISODE_COLUMNS:
-        if f"scengen/{name}" not in told:
+        if f"scengen/{name}" not in stored:
             yield label(name, "is missing")
-    made = {"id": scenario.id, "code": task.code, "scene_sha256": sha256(text), "axes": _axes(told)}
+    made = {"id": scenario.id, "code": task.code, "scene_sha256": sha256(text), "axes": _axes(stored)}
     for name, here in made.items():
-        if plain_value(here) != (there := told.get(f"scengen/{name}")):
+        if plain_value(here) != (there := stored.get(f"scengen/{name}")):
             yield label(name, f"is {ascii(there)[:60]}, not {ascii(here)[:60]}")
-    yield from _differences(told, task)
-    yield from _wrongly_drawn(told, task)
+    yield from _differences(stored, task)
+    yield from _wrongly_drawn(stored, task)
 
 
-def wrong_result(told: Mapping[str, Any], success: bool, seconds: float) -> Iterator[Finding]:
+def wrong_result(stored: Mapping[str, Any], success: bool, seconds: float) -> Iterator[Finding]:
     """Findings about the result of an episode.
 
     Args:
@@ -50,7 +50,7 @@ def wrong_result(told: Mapping[str, Any], success: bool, seconds: float) -> Iter
     """
     made = {"success": success, **({"seconds": round(seconds, 6)} if success else {})}
     for name, here in made.items():
-        if (there := told.get(f"scengen/{name}", here)) != here:
+        if (there := stored.get(f"scengen/{name}", here)) != here:
             yield label(name, f"is {ascii(there)[:60]}, that of the replay is {here}")
 
 
@@ -59,30 +59,30 @@ def label(name: str, why: str) -> Finding:
     return Finding("LABEL", "error", (), {}, f"scengen/{name} {why}")
 
 
-def _axes(told: Mapping[str, Any]) -> Any:
+def _axes(stored: Mapping[str, Any]) -> Any:
     try:
-        return Split.parse(str(told.get("scengen/split"))).axes
+        return Split.parse(str(stored.get("scengen/split"))).axes
     except ScengenError:
         return ()
 
 
-def _differences(told: Mapping[str, Any], task: Task) -> Iterator[Finding]:
+def _differences(stored: Mapping[str, Any], task: Task) -> Iterator[Finding]:
     """Differences from the installed task: the recording may be of one that a command line has changed."""
     installed = {"tasks": [task.instruction], "scengen/horizon": task.horizon, "scengen/rules": STRICT}
     installed[TASK_VERSION] = task.version
     for name, here in installed.items():
-        if (there := told.get(name, here)) != here:
+        if (there := stored.get(name, here)) != here:
             why = f"{name} is {ascii(there)[:100]}, that of the installed task is {ascii(here)[:100]}"
             yield Finding("TASK", "warning", (), {}, why)
 
 
-def _wrongly_drawn(told: Mapping[str, Any], task: Task) -> Iterator[Finding]:
+def _wrongly_drawn(stored: Mapping[str, Any], task: Task) -> Iterator[Finding]:
     """Whether split, seed and index give this scenario. Another task or design than the installed one may have."""
     try:
-        design = task.design(str(told.get("scengen/sampler", "iid")))
-        split, seed, index = (told[f"scengen/{name}"] for name in ("split", "seed", "index"))
+        design = task.design(str(stored.get("scengen/sampler", "iid")))
+        split, seed, index = (stored[f"scengen/{name}"] for name in ("split", "seed", "index"))
         draw = labels_of_draw(task.draw(str(split), int(seed), int(index), design))
-        wrong = [name for name in DRAWN if comparable(plain_value(draw[name])) != comparable(told[f"scengen/{name}"])]
+        wrong = [name for name in DRAWN if comparable(plain_value(draw[name])) != comparable(stored[f"scengen/{name}"])]
         why = f"other values of {', '.join(wrong)}" if wrong else ""
     except Infeasible:
         why = "no feasible scenario"

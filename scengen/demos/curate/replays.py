@@ -51,7 +51,7 @@ class Recorded:
     actions: NDArray[np.float32]
     """Actions of all control periods of each row, shape (rows, periods, 7 * arms)."""
     streams: Mapping[str, NDArray[np.float32]]
-    """Streams at the beginning of each row, and columns that nobody knows."""
+    """Streams at the beginning of each row, and columns of unknown names."""
     results: Mapping[str, NDArray[Any]]
     """The columns of `RESULTS` that were recorded."""
     told: Mapping[str, Any]

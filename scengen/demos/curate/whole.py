@@ -1,4 +1,4 @@
-"""Files beside the rows of a recording, compared with its rows: statistics, instructions, and the table of episodes."""
+"""The files of a recording without rows, compared with its rows: statistics, instructions, and the table of episodes."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -46,7 +46,7 @@ class Whole:
         self.partial, self.rows = True, int(episode.about["dataset_to_index"])
 
     def of_episode(self, episode: EpisodeData) -> Iterator[Finding]:
-        """Findings about the files beside the rows of the next episode."""
+        """Findings about the other files of the next episode."""
         about, recording = episode.about, self.recording
         if about.get("episode_index") != episode.number or about["dataset_from_index"] != self.rows:
             yield _finding("EPISODE_TABLE", "the table of episodes leaves rows out, or counts them twice")

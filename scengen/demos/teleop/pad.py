@@ -99,7 +99,7 @@ def read_events(path: Path) -> TimedEvents:
     try:
         lines = read_plain(path, MAX_FILE).decode().splitlines()
     except (OSError, ValueError) as error:
-        what = "it is no text" if isinstance(error, UnicodeDecodeError) else str(error)
+        what = "it is not text" if isinstance(error, UnicodeDecodeError) else str(error)
         why = " ".join((getattr(error, "strerror", "") or what).split()).lower()
         raise BadConfig(f"{cut(str(path))} cannot be read: {why}; give a file of JSON lines, script:FILE") from None
     found: TimedEvents = {}

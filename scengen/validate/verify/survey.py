@@ -218,7 +218,7 @@ def wrong_losses(manifest: Manifest, again: Mapping[int, str]) -> Iterator[str]:
 
 
 def unlike(reasons: Mapping[str, int], again: Counter[str], free: Collection[str]) -> str:
-    """How counted reasons differ from those of what was made again, in words; empty if they do not.
+    """How counted reasons differ from those of what was made again, as text; empty if they do not.
 
     Args:
         again: number by reason of what was made again; "" counts successes.
