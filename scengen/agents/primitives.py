@@ -114,7 +114,8 @@ def _written(text: str) -> tuple[Call, ...]:
 def _arguments(call: Call, strict: bool) -> Any:
     """The arguments of a call as data. Some endpoints write them as JSON twice, or leave a tag behind them."""
     given = read_json(call.arguments or "{}", strict)
-    return read_json(given, strict) if isinstance(given, str) and not strict else given
+    given = read_json(given, strict) if isinstance(given, str) and not strict else given
+    return {} if given is None else given
 
 
 def primitive(call: Call, world: World, strict: bool = True) -> Primitive:
@@ -127,7 +128,7 @@ def primitive(call: Call, world: World, strict: bool = True) -> Primitive:
     if call.name not in found:
         raise BadCall(f"there is no tool {cut(repr(call.name))}; tools: {', '.join(found)}")
     try:
-        given = _arguments(call, strict) or {}
+        given = _arguments(call, strict)
     except FormatError:
         raise BadCall(f"the arguments of {call.name} are not JSON") from None
     if not isinstance(given, dict):
