@@ -12,10 +12,11 @@ class _Decision:
     """Base of decisions: what the right answer is meant to follow from."""
 
     by: tuple[str, ...] = ()
-    """Parameters that the right answer is meant to follow from, or groups of them such as `cube`.
+    """Sources that the right answer is meant to follow from: parameters, groups of them such as `cube`, or patterns of
+    visible quantities such as `ball_*.redness` (`scengen.ood.cues.quantities`).
 
-    A visible quantity that depends on one of them is intended. A parameter that states an answer (`param(answer=True)`)
-    cannot be among them.
+    A visible quantity is intended if it matches a source or depends on one. A parameter that states an answer
+    (`param(answer=True)`) is no source.
     """
 
 
@@ -71,7 +72,7 @@ def near(at: ArrayLike, within: float, *by: str) -> Near:
     return Near(by, at=at, within=float(within))
 
 
-def side(value: float) -> str:
+def side_of(value: float) -> str:
     """Side of a signed number: `left` if it is positive, else `right`."""
     return "left" if value > 0 else "right"
 

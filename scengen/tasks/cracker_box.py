@@ -9,6 +9,7 @@ import numpy as np
 from ..assets.bin import Bin
 from ..assets.cracker_box import CrackerBox, slot_for
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, choice, near, side_of
 from ..geometry import UP, Outline, Vec3, corners
 from ..scenario import Scenario
 
@@ -60,6 +61,16 @@ class BoxAndSlot(Scenario):
     @property
     def _box_outline(self) -> Outline:
         return corners(self.start, math.radians(self.box_yaw + 90.0), self.box.size)
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        turn = math.remainder(self.slot_yaw - self.box_yaw, 180.0)
+        return {
+            "box_turns": choice(side_of(turn), "box_yaw", "slot_yaw"),
+            "seat": near(self.foot, 0.006, "slot_x", "slot_y"),
+            "size": choice(round(self.box.scale, 2), "box"),
+        }
 
     @property
     def _slot_outline(self) -> Outline:

@@ -41,6 +41,7 @@ import numpy as np
 from ..assets.box import Domino
 from ..assets.chain import DECOY, DRIFT, GAP, MISSING, Chain, Defect, Lanes
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, choice
 from ..geometry import UP, Vec3, about_z, heading, spoken
 from ..params import param
 from ..predicates import carried, displaced, touched_only
@@ -193,6 +194,14 @@ class DominoSelect(Scenario):
         for i in range(1, self.count):
             scene.delete(scene.body(f"tile_{self.intact_lane}_{i}"))
         return {"no_chain": scene}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "lane": choice(self.intact_lane, "first", "second", "third"),
+            "direction": choice(spoken(self.heading), "heading"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

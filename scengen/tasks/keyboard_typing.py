@@ -42,6 +42,7 @@ from ..assets.keyboard import LETTERS, Keyboard, disable
 from ..assets.prop import TABLE_TOP, table
 from ..assets.words import WORDS
 from ..control.loop import Loop
+from ..decisions import Decision, choice, near
 from ..geometry import UP, Vec3, about_z
 from ..params import param
 from ..predicates import KEY_MEMORY, SEVERAL_KEYS, count_time, fallen, key_that_counts, long_enough
@@ -248,6 +249,19 @@ class KeyboardTyping(Scenario):
             if not self.owns(k):
                 disable(scene, "keyboard", letter)
         return {"dead_keys_of_the_partner": scene}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        first = self.keyboard.at(self.letters[self.own[0]])[:2]
+        return {
+            "begins": choice(self.owns(0)),
+            "own_places": choice(tuple(self.own)),
+            "word": choice(self.word),
+            "first_own_key": near(
+                self.spot[:2] + about_z(math.radians(self.yaw))[:2, :2] @ first, 0.010, "x", "y", "yaw"
+            ),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -33,6 +33,7 @@ import numpy as np
 from ..assets.box import Cube
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.zone import Zone
+from ..decisions import Decision, choice
 from ..geometry import UP, Outline, Vec3, corners, gap, least_gap
 from ..params import Bounded, param
 from ..predicates import fallen, held, rests_on, still
@@ -268,6 +269,17 @@ class MassSort(Scenario):
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """The scene looks the same, with the lightest and the heaviest cube exchanged."""
         return {"masses_exchanged": replace(self, light=self.heavy, heavy=self.light).build()}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        masses = ("light", "middle", "heavy")
+        return {
+            "lightest": choice(self.ranks.index(0), *masses),
+            "heaviest": choice(self.ranks.index(2), *masses),
+            "order": choice(tuple(self.ranks), *masses),
+            "side_of_the_light_zone": choice(self.mirrored, "*zone*.y", "*zone*redness", "*zone*lightness"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -38,6 +38,7 @@ import numpy as np
 from ..assets.box import Cube, Lid
 from ..assets.patch import Patch
 from ..assets.prop import CAMERAS, TABLE_TOP, Rgba, place, table
+from ..decisions import Decision, choice, near
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap, least_gap
 from ..params import Bounded, param
 from ..predicates import fallen, over, rests_on, still
@@ -249,6 +250,17 @@ class OccluderPush(Scenario):
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """The scene looks the same, with the red cube under the next lid."""
         return {"red_elsewhere": replace(self, red=(self.red + 1) % CUBE_COUNT).build()}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        ways = [spoken(math.degrees(math.atan2(way[1], way[0]))) for way in self.directions]
+        sources = ("left", "middle", "right", "patch_x", "patch_y")
+        return {
+            "red": choice(self.red),
+            "patch": near(self.goal, 0.033, "patch_x", "patch_y"),
+            **{f"lid_{k}_goes": choice(way, *sources) for k, way in enumerate(ways)},
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

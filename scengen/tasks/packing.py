@@ -44,6 +44,7 @@ from ..assets.bin import Bin
 from ..assets.guillotine import Ell
 from ..assets.l_piece import LPiece
 from ..assets.prop import TABLE_TOP, Rgba, place, table
+from ..decisions import Decision, around, choice, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, corners, least_gap, way_to, yaw_of
 from ..params import Bounded, param
@@ -244,6 +245,22 @@ class Packing(Scenario):
         i, other = guillotine.misfit(*self.cut)
         pieces = [*self.pieces[:i], self.shape(other, COLOURS[i]), *self.pieces[i + 1 :]]
         return {"a_piece_that_does_not_fit": self._scene(pieces)}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        sizes, found = (
+            ("left", "right", "low", "rise", "top"),
+            {"arrangement": choice((self.mirror, self.deal), *self.SIZES)},
+        )
+        for i in range(self.count):
+            (at, yaw), (_, begins) = self.goal(i), self.start(i)
+            across = about_z(-math.radians(self.heading)) @ (at - [self.x, self.y, 0.0])
+            turn = math.degrees(math.remainder(yaw - begins, math.tau))
+            found[f"slot_of_piece_{i}"] = choice((bool(across[0] > 0), bool(across[1] > 0)), *self.SIZES)
+            found[f"piece_{i}_turns"] = choice(side_of(turn), f"spot_{i}.turn")
+            found[f"turn_of_piece_{i}"] = around(turn, 22.0, f"spot_{i}.turn")
+        return found
 
     # --- constraints ------------------------------------------------------------------------
 

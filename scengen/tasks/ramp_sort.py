@@ -36,6 +36,7 @@ from ..assets.barrier import Barrier, let_pass
 from ..assets.bin import Bin
 from ..assets.crowned_ramp import CrownedRamp
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, choice, near, side_of, span
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
 from ..params import param
@@ -258,6 +259,22 @@ class RampSort(Scenario):
         bare = self.build()
         bare.delete(bare.body("ramp"))
         return {"no_ramp": bare, "bins_exchanged": self._scene(-self.red_side)}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        colours = ("ball_*.redness", "ball_*.lightness", "*ness of ball", "*_bin.*", "red_side")
+        sides = {
+            f"side_of_ball_{i}": choice(side_of(self.red_side if red else -self.red_side), *colours)
+            for i, red in enumerate(self.colours)
+        }
+        return sides | {
+            "side_of_red": choice(self.red_side, "*_bin.*", "red_side"),
+            "release_to_the_left": span(
+                self.ramp.ridge + self.band, self.ramp.width / 2 - self.ball.radius, "ramp.ridge"
+            ),
+            "ramp": near((self.x, self.y), 0.020, "x", "y"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

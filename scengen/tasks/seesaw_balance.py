@@ -39,6 +39,7 @@ import numpy as np
 from ..assets.box import Block
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.seesaw import Seesaw, standing
+from ..decisions import Decision, around, choice, near
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, compound, heading, quat, spoken
 from ..params import param, with_values
@@ -254,6 +255,19 @@ class SeesawBalance(Scenario):
         scene = self.build()
         scene.delete(scene.body("weight"))
         return {"no_counterweight": scene}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        ways = self.balance * np.array([math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))])
+        masses = ("target.mass", "weight.mass", "seesaw.mass")
+        return {
+            "arm": choice(spoken(self.heading + (0.0 if self.raised > 0 else 180.0)), *masses, "seesaw.yaw"),
+            "arm_beside_the_target": choice("other" if self.raised * self.offset < 0 else "the same", *masses),
+            "place_on_the_arm": around(abs(self.balance), self.margin, *masses),
+            "place_on_the_table": near(ways + [self.x, self.y], self.margin, *masses),
+            "beyond_the_target": choice(bool(abs(self.balance) > abs(self.offset)), *masses),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -33,6 +33,7 @@ import numpy as np
 
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.shape import CONE_SLOPE, CYLINDER, FRUSTUM, HEXAGON, TRIANGLE, Shape
+from ..decisions import Decision, choice
 from ..geometry import UP, Vec3, about_z
 from ..params import Bounded, param
 from ..predicates import fallen, still
@@ -212,6 +213,17 @@ class ShapeStack(Scenario):
             yield from self.pile(world, [*(name for name in self.order if name != top), top])
 
         return Answer((0.0, 1.0, 2.0), last, lambda number: names[round(number)] == self.order[-1], tries=1)
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        widths = ("*width*", "*length*")
+        return {
+            "last": choice(self.order[-1]),
+            "base": choice(self.order[0], *widths),
+            "second": choice(self.order[1], *widths),
+            "shapes": choice(self.count, "count"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -40,6 +40,7 @@ from ..assets.box import Cube
 from ..assets.catch_bin import CatchBin
 from ..assets.incline import Incline, Load, LoadedIncline, driven
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, around, choice, near
 from ..geometry import UP, Vec3, about_z, yaw_of
 from ..params import param
 from ..predicates import fallen, still
@@ -237,6 +238,18 @@ class SlideCatch(Scenario):
         exchanged = list(self.loads)
         exchanged[lowest], exchanged[highest] = exchanged[highest], exchanged[lowest]
         return {"frictions_exchanged": self._scene(exchanged)}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        first, loads = self.ramp.sequence[0], ("block_*.redness", "block_*.lightness", "*ness of block")
+        return {
+            "first_lane": choice(first, *loads),
+            "last_lane": choice(self.ramp.sequence[-1], *loads),
+            "sequence": choice(tuple(self.ramp.sequence), *loads),
+            "time_of_the_first": around(self.slide_start(first), 0.3, "start", "rate"),
+            "bin_below_the_first": near(self.bin_at(self.spot(first)[1]), 0.020, "y", "lane"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

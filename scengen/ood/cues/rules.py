@@ -5,12 +5,12 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...decisions import Choice, Decision, Near, Span, places
+from ...decisions import Choice, Near, Span, places
 from ...errors import BadConfig
 from .quantities import Floats, Sample
 
@@ -111,18 +111,15 @@ def answers(sample: Sample, name: str) -> Answers:
     Raises:
         BadConfig: the decision has several kinds.
     """
-    decisions = [row[name] for row in sample.decisions]
-    if _all(decisions, Choice):
-        return Choices(decisions)
-    if _all(decisions, Span):
-        return Spans(decisions)
-    if _all(decisions, Near):
-        return Nears(places(decisions), np.array([one.within for one in decisions]))
-    raise BadConfig(f"decision {name!r} is of different kinds in different scenarios; it must be of one kind")
-
-
-def _all[D: Decision](decisions: Sequence[Decision], kind: type[D]) -> TypeGuard[Sequence[D]]:
-    return all(isinstance(one, kind) for one in decisions)
+    every = [row[name] for row in sample.decisions]
+    choices = [one for one in every if isinstance(one, Choice)]
+    spans = [one for one in every if isinstance(one, Span)]
+    nears = [one for one in every if isinstance(one, Near)]
+    if not every or len(every) not in (len(choices), len(spans), len(nears)):
+        raise BadConfig(f"decision {name!r} is of different kinds in different scenarios; it must be of one kind")
+    if choices:
+        return Choices(choices)
+    return Spans(spans) if spans else Nears(places(nears), np.array([one.within for one in nears]))
 
 
 def _cells(column: Floats) -> NDArray[np.int64]:
