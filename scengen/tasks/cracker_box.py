@@ -1,6 +1,7 @@
 """What the two tasks with a cracker box and a slot share (T08, T09): the scene, its tolerances, and positions in it."""
 
 import math
+from collections.abc import Mapping
 from functools import cached_property
 
 import mujoco
@@ -38,6 +39,14 @@ class BoxAndSlot(Scenario):
         place(scene, box, "box", self.start, math.radians(self.box_yaw + 90.0))
         return scene
 
+    def decisions(self) -> Mapping[str, Decision]:
+        turn = math.remainder(self.slot_yaw - self.box_yaw, 180.0)
+        return {
+            "box_turns": choice(side_of(turn), "box_yaw", "slot_yaw"),
+            "seat": near(self.foot, 0.006, "slot_x", "slot_y"),
+            "size": choice(round(self.box.scale, 2), "box"),
+        }
+
     @cached_property
     def slot(self) -> Bin:
         """Slot that fits the box."""
@@ -61,16 +70,6 @@ class BoxAndSlot(Scenario):
     @property
     def _box_outline(self) -> Outline:
         return corners(self.start, math.radians(self.box_yaw + 90.0), self.box.size)
-
-    # --- decisions ---------------------------------------------------------------------------
-
-    def decisions(self) -> Mapping[str, Decision]:
-        turn = math.remainder(self.slot_yaw - self.box_yaw, 180.0)
-        return {
-            "box_turns": choice(side_of(turn), "box_yaw", "slot_yaw"),
-            "seat": near(self.foot, 0.006, "slot_x", "slot_y"),
-            "size": choice(round(self.box.scale, 2), "box"),
-        }
 
     @property
     def _slot_outline(self) -> Outline:

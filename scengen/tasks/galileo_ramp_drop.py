@@ -35,7 +35,7 @@ from ..assets.ball import Ball
 from ..assets.bin import Bin
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ramp import WALL_RISE, WALL_THICKNESS, Ramp
-from ..decisions import Decision, around, span
+from ..decisions import Decision, around
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, spoken
 from ..params import param
 from ..robots import jaw
@@ -198,11 +198,9 @@ class GalileoRampDrop(Scenario):
 
     def decisions(self) -> Mapping[str, Decision]:
         highest, wanted = self.ramp.height(self.brim), self.ramp.height(self.release_place)
-        low, high = (abs(self.ramp.at_height(wanted + sign * self.ramp.band / 2)) for sign in (-1, 1))
         return {
             "share_of_the_height": around(wanted / highest, self.ramp.band / 2 / highest, "ramp.level"),
             "height": around(wanted, self.ramp.band / 2, "ramp.level"),
-            "distance_from_the_middle": span(low, high, "ramp.level"),
         }
 
     # --- constraints ------------------------------------------------------------------------

@@ -39,7 +39,7 @@ from ..assets.box import Cube, Lid
 from ..assets.patch import Patch
 from ..assets.prop import CAMERAS, TABLE_TOP, Rgba, place, table
 from ..decisions import Decision, choice, near
-from ..geometry import UP, Outline, Vec3, about_z, corners, gap, least_gap
+from ..geometry import UP, Outline, Vec3, about_z, corners, gap, least_gap, spoken
 from ..params import Bounded, param
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW

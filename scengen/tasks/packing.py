@@ -249,15 +249,13 @@ class Packing(Scenario):
     # --- decisions ---------------------------------------------------------------------------
 
     def decisions(self) -> Mapping[str, Decision]:
-        sizes, found = (
-            ("left", "right", "low", "rise", "top"),
-            {"arrangement": choice((self.mirror, self.deal), *self.SIZES)},
-        )
+        sizes = ("left", "right", "low", "rise", "top")
+        found: dict[str, Decision] = {"arrangement": choice((self.mirror, self.deal), *sizes)}
         for i in range(self.count):
             (at, yaw), (_, begins) = self.goal(i), self.start(i)
             across = about_z(-math.radians(self.heading)) @ (at - [self.x, self.y, 0.0])
             turn = math.degrees(math.remainder(yaw - begins, math.tau))
-            found[f"slot_of_piece_{i}"] = choice((bool(across[0] > 0), bool(across[1] > 0)), *self.SIZES)
+            found[f"slot_of_piece_{i}"] = choice((bool(across[0] > 0), bool(across[1] > 0)), *sizes)
             found[f"piece_{i}_turns"] = choice(side_of(turn), f"spot_{i}.turn")
             found[f"turn_of_piece_{i}"] = around(turn, 22.0, f"spot_{i}.turn")
         return found

@@ -11,6 +11,7 @@
 """
 
 import math
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Generic, TypeVar
 

@@ -264,15 +264,12 @@ class RampSort(Scenario):
 
     def decisions(self) -> Mapping[str, Decision]:
         colours = ("ball_*.redness", "ball_*.lightness", "*ness of ball", "*_bin.*", "red_side")
-        sides = {
-            f"side_of_ball_{i}": choice(side_of(self.red_side if red else -self.red_side), *colours)
-            for i, red in enumerate(self.colours)
-        }
-        return sides | {
+        sides = [side_of(self.red_side if red else -self.red_side) for red in self.colours]
+        low, high = self.ramp.ridge + self.band, self.ramp.width / 2 - self.ball.radius
+        return {
+            **{f"side_of_ball_{i}": choice(side, *colours) for i, side in enumerate(sides)},
             "side_of_red": choice(self.red_side, "*_bin.*", "red_side"),
-            "release_to_the_left": span(
-                self.ramp.ridge + self.band, self.ramp.width / 2 - self.ball.radius, "ramp.ridge"
-            ),
+            "release_to_the_left": span(low, high, "ramp.ridge"),
             "ramp": near((self.x, self.y), 0.020, "x", "y"),
         }
 

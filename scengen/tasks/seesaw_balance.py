@@ -259,13 +259,13 @@ class SeesawBalance(Scenario):
     # --- decisions ---------------------------------------------------------------------------
 
     def decisions(self) -> Mapping[str, Decision]:
-        ways = self.balance * np.array([math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))])
+        at = np.array([self.x, self.y, 0.0]) + self.balance * heading(self.heading)
         masses = ("target.mass", "weight.mass", "seesaw.mass")
         return {
             "arm": choice(spoken(self.heading + (0.0 if self.raised > 0 else 180.0)), *masses, "seesaw.yaw"),
             "arm_beside_the_target": choice("other" if self.raised * self.offset < 0 else "the same", *masses),
             "place_on_the_arm": around(abs(self.balance), self.margin, *masses),
-            "place_on_the_table": near(ways + [self.x, self.y], self.margin, *masses),
+            "place_on_the_table": near(at, self.margin, *masses),
             "beyond_the_target": choice(bool(abs(self.balance) > abs(self.offset)), *masses),
         }
 

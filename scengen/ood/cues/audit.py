@@ -24,7 +24,7 @@ FITTED = 0.6
 MIN_DRAWS = 40
 """Number of scenarios below which nothing is measured."""
 LEVEL = 0.001
-"""Level of the binomial test of a rule against the best fixed answer, divided by the number of rules that were tried."""
+"""Level of the binomial test of a rule against the best fixed answer, with Bonferroni's correction."""
 TOLD = 0.8
 """Share of the held-out draws from which a rule counts as telling the decision."""
 BROKEN = 0.75

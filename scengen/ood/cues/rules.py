@@ -1,4 +1,4 @@
-"""Rules that answer a decision: a fixed answer, one or two quantities, a place beside a body, or everything together."""
+"""Rules that answer a decision: a fixed answer, one or two quantities, a place beside a body, or all together."""
 
 import abc
 from collections import Counter
