@@ -272,9 +272,10 @@ class BallCageEscape(Scenario):
 
     def decisions(self) -> Mapping[str, Decision]:
         up = math.cos(math.radians(self.yaw)) * self.way
+        hole = ("cage.offset", "cage.yaw", "stool.yaw", "* in cage.*", "* in stool.*")  # in the axes of the cage
         return {
-            "lowered_end": choice("far" if up > 0 else "near", "yaw", "cage.offset"),
-            "side_along_the_cage": choice(side_of(self.way), "cage.offset"),
+            "lowered_end": choice("far" if up > 0 else "near", *hole),
+            "side_along_the_cage": choice(side_of(self.way), *hole),
             "tilt": span(math.degrees(self.least_tilt), 72.0, "cage", "ball.radius", "rolling"),
         }
 

@@ -16,7 +16,7 @@ from ...params import Parameter, values, with_values
 from ...samplers.keyed import unit
 from ...samplers.task import Task
 from ...scenario import Scenario
-from .quantities import Sample, visible
+from .quantities import Sample, joined, visible
 from .rules import Choices, Rule, Search, answers, varied
 
 FITTED = 0.6
@@ -37,7 +37,7 @@ MIN_JUDGED = 6
 """Number of scenarios from which an axis or a parameter is judged."""
 SWAPS = 8
 """Number of pairs of scenarios in which a value is exchanged to see which quantities depend on the parameter."""
-WIDENED = 12
+WIDENED = 8
 """Number of scenarios in which a parameter leaves its training range."""
 
 
@@ -55,6 +55,8 @@ class Cue:
     """Upper end of the 95 % interval of the share."""
     p: float
     """P-value against the best fixed answer, times the number of rules that were tried; 1 for a fixed answer."""
+    equal: Sequence[str] = ()
+    """Other quantities that follow the same line in these draws, for a rule of one quantity."""
     axes: Mapping[str, float] = field(default_factory=dict)
     """Share of right answers on each axis that keeps training's answers."""
 
@@ -155,7 +157,7 @@ def _judged(
     middle = int(FITTED * len(sample))
     fit, test = sample.part(range(middle)), sample.part(range(middle, len(sample)))
     quantities = varied(fit, intended)
-    search = Search(fit, name, quantities)
+    search = Search(fit, name, list(quantities))
     fixed = search.fixed()
     chance = float(fixed.right(test).mean())
     fair = [quantity for quantity in quantities if not intended[quantity]]
@@ -166,8 +168,11 @@ def _judged(
     def judged(rule: Rule) -> Cue:
         right = rule.right(test)
         share, n = float(right.mean()), len(right)
+        equal = quantities.get(rule.words, ())
         p = float(binom.sf(right.sum() - 1, n, max(chance, 1e-9))) if rule.uses else 1.0
-        return Cue(rule.words, share, *wilson(share, n), min(1.0, p * max(tried, 1)), _shares(rule, name, fit, axes))
+        return Cue(
+            rule.words, share, *wilson(share, n), min(1.0, p * max(tried, 1)), equal, _shares(rule, name, fit, axes)
+        )
 
     def better(rules: Iterable[Rule], most: int) -> list[tuple[Rule, Cue]]:
         ranked = sorted(rules, key=lambda rule: -rule.fitted)[:most]
@@ -281,14 +286,13 @@ class _Wider:
     def _samples(self, parameter: Parameter) -> tuple[Sample, Sample]:
         """Feasible scenarios with other values of a parameter, and such that the constraints refuse."""
         if parameter.name not in self.made:
-            free: list[Scenario] = []
-            refused: list[Scenario] = []
+            free: list[Sample] = []
+            refused: list[Sample] = []
             for scenario in self._others(parameter):
-                if scenario.infeasible() is None:
-                    free.append(scenario)
-                elif len(refused) < WIDENED and _can_be_built(scenario):
-                    refused.append(scenario)
-            self.made[parameter.name] = Sample.of(free[:WIDENED]), Sample.of(refused)
+                kept = refused if scenario.infeasible() else free
+                if len(kept) < WIDENED and (one := _built(scenario)):
+                    kept.append(one)
+            self.made[parameter.name] = joined(free), joined(refused)
         return self.made[parameter.name]
 
     def _others(self, parameter: Parameter) -> Iterator[Scenario]:
@@ -300,10 +304,9 @@ class _Wider:
             yield with_values(scenario, {parameter.name: round(value) if parameter.integer else value})
 
 
-def _can_be_built(scenario: Scenario) -> bool:
-    """Whether a scenario that the constraints refuse has a scene and decisions all the same."""
+def _built(scenario: Scenario) -> Sample | None:
+    """The sample of one scenario; None if it cannot be built. The bounds of a parameter alone do not promise that."""
     try:
-        scenario.build().compile()
-        return bool(scenario.decisions())
-    except Exception:  # refused scenarios promise nothing
-        return False
+        return Sample.of([scenario])
+    except Exception:  # families promise nothing for scenarios that their constraints refuse
+        return None

@@ -155,3 +155,9 @@ class Sample:
     def names(self) -> list[str]:
         """Names of all quantities."""
         return list(dict.fromkeys(name for row in self.quantities for name in row))
+
+
+def joined(samples: Sequence[Sample]) -> Sample:
+    """One sample of the scenarios of several."""
+    columns = ("scenarios", "quantities", "poses", "decisions")
+    return Sample(*([one for sample in samples for one in getattr(sample, column)] for column in columns))

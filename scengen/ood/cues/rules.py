@@ -262,16 +262,12 @@ def learners(module: str) -> Any:
     return found
 
 
-def varied(sample: Sample, intended: Mapping[str, bool]) -> list[str]:
-    """Names of the quantities that vary, one of those that are linear in each other and equally intended."""
-    names, taken = sample.names(), set()
-    columns, found = sample.columns(names), []
-    for name, column in zip(names, columns.T, strict=True):
-        if np.ptp(column) < 1e-6:
-            continue
-        scaled = (column - column.mean()) / column.std()
-        key = intended[name], np.round(scaled * (1.0 if scaled[0] >= 0 else -1.0), 5).tobytes()
-        if key not in taken:
-            taken.add(key)
-            found.append(name)
-    return found
+def varied(sample: Sample, intended: Mapping[str, bool]) -> dict[str, list[str]]:
+    """Quantities that vary, each with the others that are linear in it and equally intended."""
+    names, groups = sample.names(), dict[tuple[bool, bytes], list[str]]()
+    for name, column in zip(names, sample.columns(names).T, strict=True):
+        if np.ptp(column) >= 1e-6:
+            scaled = np.round((column - column.mean()) / column.std(), 5)
+            first = scaled[np.flatnonzero(scaled)[0]]
+            groups.setdefault((intended[name], (scaled * np.sign(first) + 0.0).tobytes()), []).append(name)
+    return {first: others for first, *others in groups.values()}
