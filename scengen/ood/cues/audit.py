@@ -169,7 +169,7 @@ def _judged(
         right = rule.right(test)
         share, n = float(right.mean()), len(right)
         equal = quantities.get(rule.words, ())
-        p = float(binom.sf(right.sum() - 1, n, max(chance, 1e-9))) if rule.uses else 1.0
+        p = float(binom.sf(right.sum() - 1, n, max(chance, 1.0 / n))) if rule.uses else 1.0
         return Cue(
             rule.words, share, *wilson(share, n), min(1.0, p * max(tried, 1)), equal, _shares(rule, name, fit, axes)
         )
