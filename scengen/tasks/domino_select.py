@@ -79,7 +79,7 @@ class DominoSelect(Scenario):
     heading: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
-    intact: int = param(2, "lane before the red slab, from the right", 0, RED_LANES - 1)
+    intact: int = param(2, "lane before the red slab, from the right", 0, RED_LANES - 1, answer=True)
     decoy_side: int = param(1, "-1 right, 1 left", -1, 1)
     """Side of the chain that leads to the blue slab. 0 is refuted."""
     order: int = param(0, "", 0, math.factorial(RED_LANES - 1) - 1)

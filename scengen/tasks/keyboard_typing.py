@@ -79,7 +79,7 @@ class KeyboardTyping(Scenario):
     VERSION = 1
 
     word: int = param(0, "words", 0, len(WORDS) - 1)  # number of the word in `WORDS`
-    mine: int = param(0b01010, "1", 1, 254)
+    mine: int = param(0b01010, "1", 1, 254, answer=True)
     """Places of the word that are the agent's, one bit each; the lowest bit is the first letter."""
     hold: float = param(0.2, "s", 0.05, 1.0, hidden=True)
     """Time that a key must be touched until it counts; the move is called `motion.hold`."""

@@ -92,7 +92,7 @@ class MassSort(Scenario):
     middle: float = param(0.10, "kg", 0.02, 0.6, hidden=True)
     heavy: float = param(0.20, "kg", 0.02, 0.6, hidden=True)
     """Mass of the heaviest cube; paper, App. B: 50, 100 and 200 g."""
-    order: int = param(3, "", 0, 5, hidden=True)  # index in `ORDERS` of the cubes' order
+    order: int = param(3, "", 0, 5, hidden=True, answer=True)  # index in `ORDERS` of the cubes' order
     edge: float = param(0.045, "m", 0.02, 0.07)
     friction: float = param(0.6, "1", 0.2, 1.5)
     mirrored: int = param(0, "", 0, 1)  # 1 if the zone of the lightest cube is on the right

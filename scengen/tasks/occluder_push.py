@@ -84,7 +84,7 @@ class OccluderPush(Scenario):
     VERSION = 1
     HOLD = 0.3
 
-    red: int = param(1, "0 left, 1 middle, 2 right", 0, CUBE_COUNT - 1, hidden=True)
+    red: int = param(1, "0 left, 1 middle, 2 right", 0, CUBE_COUNT - 1, hidden=True, answer=True)
     likeness: int = param(0, "0 = blue and yellow, 1 = orange and magenta", 0, 1)  # colours of the other two cubes
     lids: int = param(1, "lids", 1, 5)  # number of lids on each cube
     left: Spot = Spot(y=0.235)

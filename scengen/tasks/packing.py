@@ -96,8 +96,8 @@ class Packing(Scenario):
     low: int = param(2, "units", 2, 4)
     rise: int = param(1, "units", 1, 3)
     top: int = param(2, "units", 2, 4)
-    mirror: int = param(0, "1", 0, 1)
-    deal: int = param(0, "", 0, 5)
+    mirror: int = param(0, "1", 0, 1, answer=True)
+    deal: int = param(0, "", 0, 5, answer=True)
     """Number of the permutation that assigns the first three slots to `piece_0`, `piece_1` and `piece_2`."""
     clearance: float = param(0.0010, "m", 0.0002, 0.002)
     thickness: float = param(0.020, "m", 0.008, 0.04)

@@ -77,7 +77,7 @@ class RampSort(Scenario):
 
     reds: int = param(2, "balls", 1, 3)
     blues: int = param(2, "balls", 1, 3)
-    arrangement: int = param(0, "index", 0, math.comb(MAX_BALLS, MAX_BALLS // 2) - 1)
+    arrangement: int = param(0, "index", 0, math.comb(MAX_BALLS, MAX_BALLS // 2) - 1, answer=True)
     """Index, among all choices of places in the row, of the choice for the red balls."""
     red_side: int = param(-1, "1 left, -1 right", -1, 1)  # side of the ridge on which the red bin is; 0 is refuted
     x: float = param(0.02, "m", -0.3, 0.3)

@@ -89,8 +89,10 @@ class ShapeStack(Scenario):
     NO_ABLATIONS = "every shape is part of what is asked for: none can be taken away"
 
     count: int = param(4, "", 3, 5)  # number of shapes: the cone, and others from the first place on
-    cone_at: int = param(1, "", 0, 4)  # index of the cone's place
-    deal: int = param(0, "", 0, 23)  # index of the permutation of the other four shapes over the other places
+    cone_at: int = param(1, "", 0, 4, answer=True)  # index of the cone's place
+    deal: int = param(
+        0, "", 0, 23, answer=True
+    )  # index of the permutation of the other four shapes over the other places
     perched: int = param(0, "", 0, 1)  # 1: the cone starts on the widest shape, and its place is free
     cone: Shape = Shape(kind=FRUSTUM, width=0.042, height=0.041)
     cube: Shape = Shape()

@@ -70,7 +70,7 @@ class SlideCatch(Scenario):
     HOLD = 0.5
     MOVING = ("block_0", "block_1", "block_2")
 
-    order: int = param(0, "", 0, len(ORDERS) - 1)  # index in `ORDERS` of the lanes in which the blocks lie
+    order: int = param(0, "", 0, len(ORDERS) - 1, answer=True)  # index in `ORDERS` of the lanes in which the blocks lie
     low: Load = Load(friction=0.277, away=0.022)
     middle: Load = Load(friction=0.53, away=0.032)
     high: Load = Load(friction=0.87, away=0.040)
