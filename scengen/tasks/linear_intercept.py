@@ -216,11 +216,11 @@ class LinearIntercept(LaunchedBall):
 
     def decisions(self) -> Mapping[str, Decision]:
         motion = ("heading", "speed")
-        ways = {y: self.start[0] + (y - self.start[1]) * self.u[0] / self.u[1] for y in (0.10, 0.0, -0.10)}
-        return {
-            "drifts": choice("away" if self.u[0] > 0 else "towards the robot", *motion),
-            **{f"x_at_y_{round(100 * y)}_cm": around(x, 0.020 / abs(self.u[1]), *motion) for y, x in ways.items()},
-        }
+        found: dict[str, Decision] = {"drifts": choice("away" if self.u[0] > 0 else "towards the robot", *motion)}
+        for line, y in (("left", 0.10), ("middle", 0.0), ("right", -0.10)):
+            x = self.start[0] + (y - self.start[1]) * self.u[0] / self.u[1]
+            found[f"x_at_the_{line}_line"] = around(x, 0.020 / abs(self.u[1]), *motion)
+        return found
 
     # --- constraints ------------------------------------------------------------------------
 
