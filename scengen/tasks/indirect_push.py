@@ -257,7 +257,7 @@ class IndirectPush(Scenario):
             "head_of_the_chain": choice(self.chosen[0], "block_0", "block_1", "block_2", "bearing"),
             "left_over": choice(rest[0] if rest else "none", "block_0", "block_1", "block_2", "bearing"),
             "end_of_the_push": around(self.distance + self.way, 0.018, "distance", "way"),
-            "bearing": around(self.bearing, math.degrees(0.018 / 0.92), "bearing"),
+            "bearing": around(self.bearing, math.degrees(0.025 / 0.92), "bearing"),
         }
 
     # --- constraints ------------------------------------------------------------------------

@@ -255,11 +255,11 @@ class KeyboardTyping(Scenario):
     def decisions(self) -> Mapping[str, Decision]:
         first = self.keyboard.at(self.letters[self.own[0]])[:2]
         return {
-            "begins": choice(self.owns(0)),
-            "own_places": choice(tuple(self.own)),
-            "word": choice(self.word),
+            "begins": choice(self.owns(0), "typed_*", "* of typed"),
+            "own_places": choice(tuple(self.own), "typed_*", "* of typed"),
+            "word": choice(self.word, "typed_*", "* of typed"),
             "first_own_key": near(
-                self.spot[:2] + about_z(math.radians(self.yaw))[:2, :2] @ first, 0.010, "x", "y", "yaw"
+                self.spot[:2] + about_z(math.radians(self.yaw))[:2, :2] @ first, 0.010, "typed_*", "x", "y", "yaw"
             ),
         }
 

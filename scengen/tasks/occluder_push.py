@@ -39,7 +39,7 @@ from ..assets.box import Cube, Lid
 from ..assets.patch import Patch
 from ..assets.prop import CAMERAS, TABLE_TOP, Rgba, place, table
 from ..decisions import Decision, choice, near
-from ..geometry import UP, Outline, Vec3, about_z, corners, gap, least_gap, spoken
+from ..geometry import UP, Outline, Vec3, about_z, corners, gap, least_gap
 from ..params import Bounded, param
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
@@ -82,6 +82,7 @@ class OccluderPush(Scenario):
     """Three covered cubes and a green patch."""
 
     VERSION = 1
+    CONCEALED = ("cube_*",)
     HOLD = 0.3
 
     red: int = param(1, "0 left, 1 middle, 2 right", 0, CUBE_COUNT - 1, hidden=True, answer=True)
@@ -254,13 +255,7 @@ class OccluderPush(Scenario):
     # --- decisions ---------------------------------------------------------------------------
 
     def decisions(self) -> Mapping[str, Decision]:
-        ways = [spoken(math.degrees(math.atan2(way[1], way[0]))) for way in self.directions]
-        sources = ("left", "middle", "right", "patch_x", "patch_y")
-        return {
-            "red": choice(self.red),
-            "patch": near(self.goal, 0.033, "patch_x", "patch_y"),
-            **{f"lid_{k}_goes": choice(way, *sources) for k, way in enumerate(ways)},
-        }
+        return {"red": choice(self.red), "patch": near(self.goal, 0.033, "patch_x", "patch_y")}
 
     # --- constraints ------------------------------------------------------------------------
 

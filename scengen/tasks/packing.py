@@ -249,7 +249,7 @@ class Packing(Scenario):
     # --- decisions ---------------------------------------------------------------------------
 
     def decisions(self) -> Mapping[str, Decision]:
-        sizes = ("left", "right", "low", "rise", "top")
+        sizes = ("left", "right", "low", "rise", "top", "*width*", "*length*")
         found: dict[str, Decision] = {"arrangement": choice((self.mirror, self.deal), *sizes)}
         for i in range(self.count):
             (at, yaw), (_, begins) = self.goal(i), self.start(i)

@@ -262,7 +262,6 @@ class SeesawBalance(Scenario):
         at = np.array([self.x, self.y, 0.0]) + self.balance * heading(self.heading)
         masses = ("target.mass", "weight.mass", "seesaw.mass")
         return {
-            "arm": choice(spoken(self.heading + (0.0 if self.raised > 0 else 180.0)), *masses, "seesaw.yaw"),
             "arm_beside_the_target": choice("other" if self.raised * self.offset < 0 else "the same", *masses),
             "place_on_the_arm": around(abs(self.balance), self.margin, *masses),
             "place_on_the_table": near(at, self.margin, *masses),

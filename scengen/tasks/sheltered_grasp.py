@@ -91,6 +91,7 @@ class ShelteredGrasp(Scenario):
     """An object in a rack that is open on one side, and a tray on the table before it."""
 
     VERSION = 1
+    CONCEALED = ("thing",)
     HOLD = 0.3
 
     side: int = param(1, "1 left, -1 right", -1, 1)

@@ -248,7 +248,7 @@ class SlideCatch(Scenario):
             "last_lane": choice(self.ramp.sequence[-1], *loads),
             "sequence": choice(tuple(self.ramp.sequence), *loads),
             "time_of_the_first": around(self.ramp.slide_start(first), 0.3, "start", "rate"),
-            "bin_below_the_first": near(self.bin_at(self.spot(first)[1]), 0.020, "y", "lane"),
+            "bin_below_the_first": near(self.bin_at(self.ramp.spot(first)[1]), 0.020, "y", "lane"),
         }
 
     # --- constraints ------------------------------------------------------------------------
