@@ -275,8 +275,8 @@ class _Wider:
         for parameter, known in self.task.known.items():
             if known.answer or known.low == known.high:
                 continue
-            both = dict(zip(("feasible", "refused"), self._samples(known), strict=True))
-            shares = _shares(rule, name, training, both)
+            feasible, others = self._samples(known)
+            shares = _shares(rule, name, training, {"feasible": feasible, "refused": others})
             if shares.get("feasible", 1.0) < BROKEN:
                 free[parameter] = shares["feasible"]
             elif shares.get("refused", 1.0) < BROKEN:

@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import combinations
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -141,7 +142,7 @@ class Sample:
 
     def part(self, places: Sequence[int]) -> "Sample":
         """The scenarios at these places."""
-        columns = (self.scenarios, self.quantities, self.poses, self.decisions)
+        columns: tuple[Sequence[Any], ...] = (self.scenarios, self.quantities, self.poses, self.decisions)
         return Sample(*([column[k] for k in places] for column in columns))
 
     def with_decision(self, name: str) -> "Sample":

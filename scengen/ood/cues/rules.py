@@ -162,7 +162,7 @@ class Search:
         if isinstance(self.answers, Nears):
             for body in self.sample.poses[0]:
                 if all(body in row for row in self.sample.poses):
-                    yield from (self._beside(body, turned) for turned in (False, True))
+                    yield from (self._beside(body, turned, self.answers) for turned in (False, True))
 
     def pairs(self, fair: Sequence[str]) -> Iterator[Rule]:
         """The most promising rules of two of some quantities: those whose cells hold the fewest classes of answers."""
@@ -216,10 +216,10 @@ class Search:
         at = _in_most(spans.low - x @ slope, spans.high - x @ slope)
         return self._rule(" & ".join(uses), uses, lambda sample: list(sample.columns(uses) @ slope + at))
 
-    def _beside(self, body: str, turned: bool) -> Rule:
+    def _beside(self, body: str, turned: bool, nears: Nears) -> Rule:
         """A fixed place beside a body, in the axes of the table or, turned, in its own."""
         poses = np.array([row[body] for row in self.sample.poses])
-        local = Nears(_seen_from(poses, self.answers.learned, turned), getattr(self.answers, "within"))  # noqa: B009
+        local = Nears(_seen_from(poses, nears.learned, turned), nears.within)
         best = local.best(self.rows)
 
         def guesses(sample: Sample) -> Sequence[Any]:
