@@ -17,7 +17,7 @@ from scengen.samplers.split import ID
 
 DRAWS = 240
 FOUND = {
-    ("shape_stack", "last"): ("most z of shape", "least width of shape", "most redness of shape"),
+    ("shape_stack", "last"): ("most z of shape", "least width of shape", "the one with redness"),
     ("ball_cage_escape", "lowered_end"): ("cage-stool.dx", "ball-cage.dx"),
     ("packing", "arrangement"): ("piece_1.yaw", "all "),
     ("balance_medium", "foot_beside_ridge"): ("always",),

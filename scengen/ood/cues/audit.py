@@ -25,10 +25,9 @@ MIN_DRAWS = 40
 """Number of scenarios below which nothing is measured."""
 LEVEL = 0.001
 """Level of the binomial test of a rule against the best fixed answer, with Bonferroni's correction."""
-TOLD = 0.8
-"""Share of the held-out draws from which a rule counts as telling the decision."""
-BROKEN = 0.75
-"""Share of an axis's draws below which the axis breaks a rule that tells the decision in training."""
+TOLD = 0.75
+"""Share of the held-out draws from which a rule counts as telling the decision. An axis on which it is right in
+fewer draws breaks it."""
 SIMPLER = 0.05
 """Share by which a rule must be better than a simpler one to be reported instead of it."""
 MAX_CUES = 12
@@ -63,7 +62,7 @@ class Cue:
     @property
     def breaks(self) -> list[str]:
         """Axes that break the rule."""
-        return [axis for axis, share in self.axes.items() if share < BROKEN]
+        return [axis for axis, share in self.axes.items() if share < TOLD]
 
 
 @dataclass(frozen=True)
@@ -277,9 +276,9 @@ class _Wider:
                 continue
             feasible, others = self._samples(known)
             shares = _shares(rule, name, training, {"feasible": feasible, "refused": others})
-            if shares.get("feasible", 1.0) < BROKEN:
+            if shares.get("feasible", 1.0) < TOLD:
                 free[parameter] = shares["feasible"]
-            elif shares.get("refused", 1.0) < BROKEN:
+            elif shares.get("refused", 1.0) < TOLD:
                 refused.append(parameter)
         return dict(sorted(free.items(), key=lambda item: item[1])), refused
 

@@ -8,6 +8,7 @@ masses. Names:
     tray-cube.dx               between two bodies: dx, dy, apart, width, height [m]
     tray in cube.ahead         place of the tray in the axes of the cube: ahead, left [m]
     most height of shape       number of the body with the most or the least of something among like bodies
+    the one with redness 0.61, lightness 0.40 of shape      number of the only body of that colour among like bodies
 """
 
 import math
@@ -17,7 +18,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import combinations
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -92,7 +92,8 @@ def _colour(model: mujoco.MjModel, geom: int) -> Floats:
 
 
 def _ranks(bodies: Mapping[str, Mapping[str, float]]) -> Iterator[tuple[str, float]]:
-    """Numbers of the bodies with the most and the least of each quantity, among like bodies that differ in it."""
+    """Numbers of the bodies with the most and the least of each quantity, or with a colour of their own, among like
+    bodies."""
     groups: dict[str, list[str]] = defaultdict(list)
     for name in bodies:
         if like := LIKE.fullmatch(name):
@@ -103,6 +104,10 @@ def _ranks(bodies: Mapping[str, Mapping[str, float]]) -> Iterator[tuple[str, flo
             if np.ptp(values) > 1e-5:
                 yield f"least {key} of {stem}", float(values.argmin())
                 yield f"most {key} of {stem}", float(values.argmax())
+        shades = [f"redness {bodies[m]['redness']:.2f}, lightness {bodies[m]['lightness']:.2f}" for m in members]
+        for number, shade in enumerate(shades):
+            if shades.count(shade) == 1 < len(shades):
+                yield f"the one with {shade} of {stem}", float(number)
 
 
 def _between(a: str, b: str, poses: Mapping[str, Floats]) -> Iterator[tuple[str, float]]:
@@ -142,8 +147,12 @@ class Sample:
 
     def part(self, places: Sequence[int]) -> "Sample":
         """The scenarios at these places."""
-        columns: tuple[Sequence[Any], ...] = (self.scenarios, self.quantities, self.poses, self.decisions)
-        return Sample(*([column[k] for k in places] for column in columns))
+        return Sample(
+            [self.scenarios[k] for k in places],
+            [self.quantities[k] for k in places],
+            [self.poses[k] for k in places],
+            [self.decisions[k] for k in places],
+        )
 
     def with_decision(self, name: str) -> "Sample":
         """The scenarios that have a decision of that name."""
