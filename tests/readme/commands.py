@@ -53,7 +53,6 @@ APART = {
     "scengen site": "films and pictures of all axes: 2 minutes",
     "scengen axis card": "an hour",
     "scengen axis discover": "an hour",
-    "scengen axis cues task=shape_stack pool=": "the pool is not made",
     "scengen axis shrink": "certifies some hundred scenarios: 10 minutes",
 }
 """Prefixes of commands that `make readme` omits, with the reason. `make readme ALL=all` runs them too."""
