@@ -144,3 +144,11 @@ def test_a_pool_of_too_few_scenarios_or_of_another_task_is_refused(capsys):
     assert "the audit needs 40 or more" in capsys.readouterr().err
     assert cli.run(["axis", "cues", "task=packing", f"pool={REFERENCE}"]) == 2
     assert "is a pool of domino_single; give task=domino_single" in capsys.readouterr().err
+
+
+@pytest.mark.long  # 9 rollouts: 20 s
+def test_a_fixed_bearing_within_the_tolerance_solves_and_the_control_does_not(capsys):
+    assert cli.run(["axis", "cues", "task=indirect_push", "blind=bearing", "axis_n=3"]) == 0
+    shown = capsys.readouterr().out
+    assert "bearing = 19.5, the middle of training, solves 3 of 3" in shown and "solves 0 of 3" in shown
+    assert cli.run(["axis", "cues", "task=indirect_push", "blind=nothing"]) == 2

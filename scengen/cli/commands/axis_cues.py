@@ -8,6 +8,7 @@ from rich.table import Table
 
 from ...errors import BadConfig
 from ...ood.cues.audit import MIN_DRAWS, Cue, DecisionAudit, audit, draws
+from ...ood.cues.blindfold import blindfold
 from ...ood.cues.stated import Compared, compared, stated
 from ...runs.progress import ProgressBar
 from ...samplers.split import ID
@@ -32,6 +33,7 @@ class CuesSettings:
     seed: int
     pool: str | list[str] | None
     widen: bool
+    blind: str | None
     json: str | None
 
 
@@ -39,6 +41,8 @@ def command(arguments: Arguments) -> int:
     settings, task = read_uncertified("axis cues", arguments, CuesSettings)
     at_least(settings, n=MIN_DRAWS, axis_n=0, seed=0)
     try_file(settings.json)
+    if settings.blind:
+        return _blindfolded(task, settings.blind, settings.seed, settings.axis_n)
     known = stated(task.name, search_path(arguments))
     scenarios = _of_pool(task, settings.pool) if settings.pool else draws(task, ID, settings.seed, settings.n)
     axes = {axis: draws(task, axis, settings.seed, settings.axis_n) for axis in task.axes} if settings.axis_n else {}
@@ -54,6 +58,15 @@ def command(arguments: Arguments) -> int:
     if settings.json:
         write_json(settings.json, {"task": task.name, "draws": len(scenarios), "decisions": [*map(_plain, found)]})
     return FAILED if result.new else OK
+
+
+def _blindfolded(task: Task, parameter: str, seed: int, count: int) -> int:
+    """Play the oracle with a parameter at training's middle, and print how often it solves the task."""
+    found = blindfold(task, parameter, draws(task, ID, seed, count))
+    middle = f"{parameter} = {found.middle:.4g}, the middle of training"
+    say(f"{task.name}: the oracle with {middle}, solves {found.solved} of {found.tried}")
+    say(f"control: with {found.control:.4g} it solves {found.controls} of {found.tried}")
+    return OK
 
 
 def _of_pool(task: Task, folder: str | list[str]) -> list[Scenario]:
@@ -82,7 +95,7 @@ def _table(task: str, count: int, found: Sequence[DecisionAudit]) -> Table:
 
 
 def _row(found: DecisionAudit, cue: Cue, intended: str) -> tuple[str, ...]:
-    right = f"{cue.share:.2f} ({cue.low:.2f} to {cue.high:.2f})"
+    right = f"{cue.share:.2f} ({cue.low:.2f}-{cue.high:.2f})"
     breaks = ", ".join(cue.breaks) if intended == "no" and found.told else ""
     return found.decision, intended, cue.rule, right, f"{found.fixed.share:.2f}", breaks
 
@@ -90,7 +103,7 @@ def _row(found: DecisionAudit, cue: Cue, intended: str) -> tuple[str, ...]:
 def _words(found: DecisionAudit, result: Compared) -> str:
     """What an unintended rule tells, what is stated of it, and what would break it."""
     statement = result.stated.get(found.decision)
-    status = f"{statement.status}: {statement.why}" if statement else "new" if result.new else "found"
+    status = f"{statement.status}: {statement.why.rstrip('.')}" if statement else "new" if result.new else "found"
     words = f"{found.decision} is told by {found.best.rule} ({status})"
     if found.best.equal:
         words += f"; equal in these draws: {', '.join(found.best.equal[:3])}"
