@@ -32,7 +32,7 @@ SIMPLER = 0.05
 """Share by which a rule must be better than a simpler one to be reported instead of it."""
 MAX_CUES = 12
 """Number of unintended rules of one quantity that are reported, at most."""
-MIN_JUDGED = 6
+MIN_JUDGED = 5
 """Number of scenarios from which an axis or a parameter is judged."""
 SWAPS = 8
 """Number of pairs of scenarios in which a value is exchanged to see which quantities depend on the parameter."""
@@ -265,16 +265,21 @@ class _Wider:
 
     def __init__(self, task: Task, sample: Sample) -> None:
         self.task, self.sample = task, sample
-        self.made: dict[str, tuple[Sample, Sample]] = {}
+        self.made: dict[str, tuple[dict[int, Sample], dict[int, Sample]]] = {}
 
     def breaking(self, rule: Rule, name: str, training: Sample) -> tuple[dict[str, float], list[str]]:
-        """Parameters that break a rule, with its shares, and those that do so only against the constraints."""
+        """Parameters that break a rule, with its shares, and those that do so only against the constraints.
+
+        Only scenarios in which the rule is right before the change count.
+        """
+        held = [k for k in range(min(len(self.sample), 3 * WIDENED)) if name in self.sample.decisions[k]]
+        held = [k for k, right in zip(held, rule.right(self.sample.part(held)), strict=True) if right]
         free: dict[str, float] = {}
         refused: list[str] = []
         for parameter, known in self.task.known.items():
             if known.answer or known.low == known.high:
                 continue
-            feasible, others = self._samples(known)
+            feasible, others = (joined([made[k] for k in held if k in made]) for made in self._samples(known))
             shares = _shares(rule, name, training, {"feasible": feasible, "refused": others})
             if shares.get("feasible", 1.0) < TOLD:
                 free[parameter] = shares["feasible"]
@@ -282,16 +287,16 @@ class _Wider:
                 refused.append(parameter)
         return dict(sorted(free.items(), key=lambda item: item[1])), refused
 
-    def _samples(self, parameter: Parameter) -> tuple[Sample, Sample]:
-        """Feasible scenarios with other values of a parameter, and such that the constraints refuse."""
+    def _samples(self, parameter: Parameter) -> tuple[dict[int, Sample], dict[int, Sample]]:
+        """Feasible scenarios with other values of a parameter, and such that the constraints refuse, by their places."""
         if parameter.name not in self.made:
-            free: list[Sample] = []
-            refused: list[Sample] = []
-            for scenario in self._others(parameter):
+            free: dict[int, Sample] = {}
+            refused: dict[int, Sample] = {}
+            for place, scenario in enumerate(self._others(parameter)):
                 kept = refused if scenario.infeasible() else free
                 if len(kept) < WIDENED and (one := _built(scenario)):
-                    kept.append(one)
-            self.made[parameter.name] = joined(free), joined(refused)
+                    kept[place] = one
+            self.made[parameter.name] = free, refused
         return self.made[parameter.name]
 
     def _others(self, parameter: Parameter) -> Iterator[Scenario]:

@@ -10,6 +10,8 @@ from ...samplers.task_files import beside
 from ...work.typed import typed
 from .audit import DecisionAudit
 
+GONE = 0.6
+"""Share of right answers below which a stated cue counts as gone: well below `audit.TOLD`, so that draws do not matter."""
 STATUSES = ("known", "accepted")
 """What a task's author says of a cue: it is to be removed, or it stays for a reason."""
 
@@ -60,5 +62,6 @@ def stated(task: str, search: Sequence[str] = ()) -> dict[str, Stated]:
 
 def compared(found: Sequence[DecisionAudit], known: Mapping[str, Stated]) -> Compared:
     """Compare the findings of an audit with what is stated."""
-    told = [one.decision for one in found if one.told]
-    return Compared(known, [name for name in told if name not in known], [name for name in known if name not in told])
+    new = [one.decision for one in found if one.told and one.decision not in known]
+    left = [one.decision for one in found if one.best.share >= GONE]
+    return Compared(known, new, [name for name in known if name not in left])
