@@ -288,7 +288,7 @@ class _Wider:
         return dict(sorted(free.items(), key=lambda item: item[1])), refused
 
     def _samples(self, parameter: Parameter) -> tuple[dict[int, Sample], dict[int, Sample]]:
-        """Feasible scenarios with other values of a parameter, and such that the constraints refuse, by their places."""
+        """Feasible scenarios with other values of a parameter, and those that the constraints refuse, by place."""
         if parameter.name not in self.made:
             free: dict[int, Sample] = {}
             refused: dict[int, Sample] = {}

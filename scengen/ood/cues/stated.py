@@ -11,7 +11,7 @@ from ...work.typed import typed
 from .audit import DecisionAudit
 
 GONE = 0.6
-"""Share of right answers below which a stated cue counts as gone: well below `audit.TOLD`, so that draws do not matter."""
+"""Share of right answers below which a stated cue counts as gone: well below `audit.TOLD`, because draws vary."""
 STATUSES = ("known", "accepted")
 """What a task's author says of a cue: it is to be removed, or it stays for a reason."""
 
