@@ -40,6 +40,9 @@ class Parameter:
     """Whether the value must not be readable from the scene's geometry, colours or names."""
     integer: bool
     """Whether the value is a whole number."""
+    answer: bool = False
+    """Whether the value states an answer that a policy must find, such as the number of the intact lane, rather than
+    the physical quantity that it follows from. The cue audit does not count it as a source."""
 
     def check(self, where: str, value: Any) -> None:
         """Raise unless `value` is a finite number of the right kind within the bounds.
@@ -55,7 +58,16 @@ class Parameter:
             raise OutOfBounds(where, value, self.low, self.high, self.unit)
 
 
-def param(nominal: N, unit: str, low: N, high: N, *, period: float | None = None, hidden: bool = False) -> N:
+def param(
+    nominal: N,
+    unit: str,
+    low: N,
+    high: N,
+    *,
+    period: float | None = None,
+    hidden: bool = False,
+    answer: bool = False,
+) -> N:
     """Declare a parameter: its nominal value, its unit and its physical bounds.
 
     The bounds are physical, not statistical: outside them the scene cannot be built or makes no sense. The
@@ -68,6 +80,7 @@ def param(nominal: N, unit: str, low: N, high: N, *, period: float | None = None
         high: highest value allowed.
         period: see `Parameter.period`.
         hidden: see `Parameter.hidden`.
+        answer: see `Parameter.answer`.
 
     Raises:
         ValueError: the period is not a positive number.
@@ -76,6 +89,7 @@ def param(nominal: N, unit: str, low: N, high: N, *, period: float | None = None
         raise ValueError(f"period = {period}; it must be a positive number, or None")
     whole = isinstance(nominal, int)
     meta = {"unit": unit, "low": low, "high": high, "period": period, "hidden": hidden, "integer": whole}
+    meta["answer"] = answer
     return dataclasses.field(default=nominal, metadata=meta)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .assets.prop import TABLE_HALF
+from .decisions import Decision
 from .errors import NoOracle
 from .orientation import UPRIGHT, Orientation
 from .params import canonical, check_bounds
@@ -123,7 +124,7 @@ class Scenario(abc.ABC):
     declares every field that it uses, so that it can be read without its families.
 
     A family file reads: fields, scene (`build`), goal (`success`, `failure`, `events`), `oracle`, `steps`,
-    `shortcuts`, `ablations`, `constraints`, `features`, `facts`, geometry.
+    `shortcuts`, `ablations`, `decisions`, `constraints`, `features`, `facts`, geometry.
     """
 
     VERSION: ClassVar[int] = 1
@@ -138,6 +139,8 @@ class Scenario(abc.ABC):
     NO_ABLATIONS: ClassVar[str] = ""
     """Reason why the family has no ablations. Its certificates state the reason, and that ablations were not
     checked."""
+    CONCEALED: ClassVar[tuple[str, ...]] = ()
+    """Bodies that no camera sees at the start, such as `cube_*` under lids. The cue audit does not look at them."""
     SYMMETRIES: ClassVar[tuple[Symmetry, ...]] = ()
     """Changes of the parameters that give the same scene, in addition to the periods that parameters declare
     themselves.
@@ -215,6 +218,15 @@ class Scenario(abc.ABC):
     def answer(self) -> Answer | None:
         """The answer that the task requires, if it can be stated as one number. Fixed guesses are tried on it."""
         return None
+
+    def decisions(self) -> Mapping[str, Decision]:
+        """Decisions that a solution depends on, by name: a choice, a number or a place, and what is right here.
+
+        `scengen axis cues` searches for visible quantities that reveal them although they are not the intended ones. A
+        family states those whose answers differ between scenarios, and tolerances that a rollout has confirmed. See
+        `scengen.decisions`.
+        """
+        return {}
 
     def constraints(self) -> Iterator[Refutation | None]:
         """Constraints on the parameters, one `require(...)` after the other. Later ones may rely on earlier ones."""

@@ -11,7 +11,7 @@ import scengen
 
 LAYERS = (
     ("errors", "geometry", "installation", "compat", "certificate"),
-    ("html_tables", "orientation", "params", "physics", "symmetry"),
+    ("decisions", "html_tables", "orientation", "params", "physics", "symmetry"),
     ("robots",),
     ("control",),
     ("sim",),
@@ -34,8 +34,8 @@ LAYERS = (
 )
 """Packages and modules of scengen from the ground up. Those of one line must not import each other."""
 WINGS = {
-    "core": """errors geometry installation compat html_tables orientation params physics symmetry robots control sim
-        assets predicates scenario episode skills samplers tasks work compose""",
+    "core": """errors geometry installation compat decisions html_tables orientation params physics symmetry robots
+        control sim assets predicates scenario episode skills samplers tasks work compose""",
     "proof": "certificate validate attack evidence conformance measures",
     "data": "pool runs demos export intake",
     "study": "learn evaluate ood agents bench drift",

@@ -53,7 +53,7 @@ VOCABULARY = {
     r"lest|albeit|hence|thereof|thereby|upon": "a common word",
 }
 """Words of a private dialect, and what to write instead in pages, docstrings, comments, error and help texts."""
-SPATIAL = ("tasks", "skills", "assets", "attack", "robots", "control")
+SPATIAL = ("tasks", "skills", "assets", "attack", "robots", "control", "cues")
 """Packages about physical scenes, in which `beside` describes a place. Elsewhere: next to, with, in addition to."""
 KEPT_WORDS = (
     "while nobody acts",  # reasons that certificates store

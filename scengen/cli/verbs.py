@@ -18,7 +18,7 @@ FORMS: Mapping[str, tuple[str, ...]] = {
     "report": ("audit", "compare"),
     "export": ("recipe", "hub"),
     "evaluate": ("power",),
-    "axis": ("card", "discover", "shrink"),
+    "axis": ("card", "cues", "discover", "shrink"),
 }
 """Second words that some commands take, each a form of the command with its own settings: `scengen show film`."""
 ONLY_FORMS = ("axis",)

@@ -213,7 +213,8 @@ def _scenes_have_controls(task: Task, split: str, scenarios: int, seed: int) -> 
         _require(len(shortcuts) >= MIN_SHORTCUTS, few)
         missing = f"{where} has no ablations, which show that the intended means are needed; add one, or say why not"
         _require(bool(ablations or scenario.NO_ABLATIONS), f"{missing} in NO_ABLATIONS")
-        for kind, names in (("shortcut", shortcuts), ("ablation", ablations), ("feature", scenario.features())):
+        named = {"shortcut": shortcuts, "ablation": ablations, "feature": scenario.features()}
+        for kind, names in {**named, "decision": scenario.decisions()}.items():
             for name in names:
                 valid = SNAKE_CASE.fullmatch(name) is not None
                 _require(valid, f"{where}: the {kind} {name!r} must have a name in snake_case, such as push_the_slab")

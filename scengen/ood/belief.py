@@ -126,6 +126,11 @@ def _play(task: Task, scenario: Scenario, planner: Scenario) -> str | None:
     return None if rollout.solved else rollout.gave_up or rollout.reason
 
 
+def solves_with(task: Task, scenario: Scenario, planner: Scenario) -> bool:
+    """Whether the oracle of another scenario, the planner's belief, solves a scenario that its own oracle solves."""
+    return _play(task, scenario, planner) is None
+
+
 def _plan(planner: Scenario, world: World) -> Plan:
     """The oracle's plan. It ends where the scene contradicts its beliefs, such as with a body that does not exist."""
     try:

@@ -106,12 +106,17 @@ def splits(name: str, search: Sequence[str] = ()) -> tuple[str, ...]:
 
 
 def facts_file(name: str, search: Sequence[str] = ()) -> Path | None:
-    """The file with the questions and sub-goals of a task, `facts/<task>.yaml` next to the folder of its task file.
+    """The file with the questions and sub-goals of a task, see `file_of_group`."""
+    return file_of_group(name, "facts", search)
+
+
+def file_of_group(name: str, group: str, search: Sequence[str] = ()) -> Path | None:
+    """The file of a task in another group, such as `facts/<task>.yaml` next to the folder of its task file.
 
     None if it has none.
     """
     path = _files(tuple(search)).get(name)
-    found = path.parents[1] / "facts" / path.name if path else None
+    found = path.parents[1] / group / path.name if path else None
     return found if found and found.is_file() else None
 
 

@@ -34,6 +34,7 @@ import numpy as np
 
 from ..assets.inlaid_rod import InlaidRod
 from ..assets.ridge import Ridge
+from ..decisions import Decision, around, choice, near, side_of
 from ..geometry import UP, Mat3, about_z, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
@@ -263,6 +264,15 @@ class UprightRod(RodAndRidge[InlaidRod]):
         scene.delete(scene.geom("stand/wall"))
         other = replace(self, rod=replace(self.rod, com=-self.rod.com))
         return {"no_ridge": scene, **({"lead_on_the_other_side": other.build()} if self.lopsided else {})}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "foot_beside_ridge": around(-self.rod.com, self.ridge.width / 2 - 0.002, "rod.com"),
+            "hand_turns": choice(side_of(self.ridge_yaw - self.rod_yaw), "rod_yaw", "ridge_yaw"),
+            "ridge": near(self.foot, 0.004, "ridge_x", "ridge_y", "ridge_yaw"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -35,6 +35,7 @@ from ..assets.ball import Ball
 from ..assets.cage import BOTTOM, END, SIDE, TOP, HoledCage, lowered
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.stool import Stool
+from ..decisions import Decision, choice, side_of, span
 from ..geometry import UP, Mat3, Vec3, about_z, shortest, spoken
 from ..params import param
 from ..predicates import fallen, inside, still
@@ -266,6 +267,17 @@ class BallCageEscape(Scenario):
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         return {"no_hole": replace(self, cage=replace(self.cage, closed=True)).build()}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        up = math.cos(math.radians(self.yaw)) * self.way
+        hole = ("cage.offset", "cage.yaw", "stool.yaw", "* in cage.*", "* in stool.*")  # in the axes of the cage
+        return {
+            "lowered_end": choice("far" if up > 0 else "near", *hole),
+            "side_along_the_cage": choice(side_of(self.way), *hole),
+            "tilt": span(math.degrees(self.least_tilt), 72.0, "cage", "ball.radius", "rolling"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

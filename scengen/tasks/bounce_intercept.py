@@ -43,6 +43,7 @@ import numpy as np
 from ..assets.ball import Ball
 from ..assets.enclosure import MAT_SIZE, Enclosure, PlacedEnclosure, Way, lay_mat
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, choice, near, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, heading, polar, way_to
 from ..params import param
@@ -206,6 +207,17 @@ class BounceIntercept(LaunchedBall):
         for geom in list(scene.body("enclosure").geoms):
             scene.delete(geom)
         return {"no_walls": scene}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        ways, motion = self._ways_after_launch(), ("aim", "speed", "enclosure", "friction", "side")
+        meeting = self.meeting(ways, self.parked_hand)
+        found = {"bounces": choice(len(ways) - 1, *motion)}
+        if meeting is None:
+            return found
+        side = choice(side_of(meeting[0][1]), *motion)
+        return found | {"catch": near(meeting[0], 0.020, *motion), "side_of_the_catch": side}
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -41,6 +41,7 @@ from ..assets.bowl import Bowl, closed
 from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ring_rack import RingRack
+from ..decisions import Decision, near
 from ..geometry import AHEAD, UP, Mat3, Vec3, about_y, about_z, corners, gap, way_to
 from ..params import param
 from ..physics import GRAVITY
@@ -268,6 +269,14 @@ class BowlTable(Scenario):
         return {"holed_foot": holed, "lidded": closed(self.build(), "bowl", self.bowl)}
 
     # --- what must hold -------------------------------------------------------------------
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "square": near(self.goal, 0.032, "goal_x", "goal_y"),
+            "foot": near(self.foot, 0.008, "rack_x", "rack_y"),
+        }
 
     def constraints(self) -> Iterator[Refutation | None]:
         bowl, rack = self.bowl, self.rack

@@ -1,6 +1,7 @@
 """Base of the two tasks with a cracker box and a slot (T08, T09): the scene, its tolerances, and positions in it."""
 
 import math
+from collections.abc import Mapping
 from functools import cached_property
 
 import mujoco
@@ -9,6 +10,7 @@ import numpy as np
 from ..assets.bin import Bin
 from ..assets.cracker_box import CrackerBox, slot_for
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, choice, near, side_of
 from ..geometry import UP, Outline, Vec3, corners
 from ..scenario import Scenario
 
@@ -36,6 +38,14 @@ class BoxAndSlot(Scenario):
         place(scene, slot, "slot", self.foot, math.radians(self.slot_yaw), free=False)
         place(scene, box, "box", self.start, math.radians(self.box_yaw + 90.0))
         return scene
+
+    def decisions(self) -> Mapping[str, Decision]:
+        turn = math.remainder(self.slot_yaw - self.box_yaw, 180.0)
+        return {
+            "box_turns": choice(side_of(turn), "box_yaw", "slot_yaw"),
+            "seat": near(self.foot, 0.006, "slot_x", "slot_y"),
+            "size": choice(round(self.box.scale, 2), "box"),
+        }
 
     @cached_property
     def slot(self) -> Bin:

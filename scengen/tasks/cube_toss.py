@@ -50,6 +50,7 @@ from ..assets.bin import Bin
 from ..assets.box import Cube
 from ..assets.prop import TABLE_HALF, TABLE_TOP, aim, place, place_in_hand, solid, table
 from ..control.loop import Loop
+from ..decisions import Decision, around, choice, side_of
 from ..geometry import UP, Vec3, about_z, heading, polar, quat, rotation, spoken
 from ..params import param
 from ..physics import flight
@@ -274,6 +275,15 @@ class CubeToss(Scenario):
         body = scene.worldbody.add_body(name="wall", pos=foot.tolist(), quat=turn)
         solid(body, "wall", [0.005, 0.3, 0.5], [0.0, 0.0, 0.5])
         return {"walled_off": scene}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "side": choice(side_of(self.bearing), "bearing"),
+            "distance": around(self.distance, 0.007, "distance"),
+            "bearing": around(self.bearing, math.degrees(0.025 / self.distance), "bearing"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -40,6 +40,7 @@ from ..assets.cup import Cup
 from ..assets.patch import Patch
 from ..assets.prop import PRIORITY, TABLE_TOP, place, solid, table
 from ..compat import set_multiccd
+from ..decisions import Decision, around, choice, near, span
 from ..geometry import UP, Vec3, about_y, about_z, heading, polar, spoken, way_to
 from ..params import param
 from ..physics import GRAVITY
@@ -246,6 +247,16 @@ class CupExtract(Scenario):
         lid = {"type": mujoco.mjtGeom.mjGEOM_CYLINDER, "mass": 0.0, "priority": PRIORITY + 1}
         solid(covered.body("cup"), "lid", [self.cup.rim, 0.001], [0.0, 0.0, self.cup.height + 0.001], **lid)
         return {"no_handle": self._scene(replace(self.cup, handle=0.0)), "covered": covered}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "handle": around(self.handle, 12.0, "handle"),
+            "tilt": span(90.0 + math.degrees(math.atan(self.cup.friction)), 130.0, "cup.friction"),
+            "square": near((self.goal_x, self.goal_y), 0.030, "goal_x", "goal_y"),
+            "side_of_the_handle": choice(self.handle > 180.0, "handle"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -36,6 +36,7 @@ import numpy as np
 from ..assets.cup import Cup
 from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, near
 from ..geometry import UP, Mat3, Vec3, between, corners, gap, rotation, shortest, way_to
 from ..params import param
 from ..physics import GRAVITY
@@ -279,6 +280,14 @@ class CupInversion(Scenario):
         return {"no_base": ring, "smooth_rim": self._scene(smooth)}
 
     # --- what must hold -------------------------------------------------------------------
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "square": near(self.goal, self.patch.size / 2 - self.cup.base, "goal_x", "goal_y"),
+            "cup": near(self.start, 0.010, "x", "y"),
+        }
 
     def constraints(self) -> Iterator[Refutation | None]:
         cup, weight = self.cup, GRAVITY * self.cup.mass

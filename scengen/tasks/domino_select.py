@@ -41,6 +41,7 @@ import numpy as np
 from ..assets.box import Domino
 from ..assets.chain import DECOY, DRIFT, GAP, MISSING, Chain, Defect, Lanes
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, choice
 from ..geometry import UP, Vec3, about_z, heading, spoken
 from ..params import param
 from ..predicates import carried, displaced, touched_only
@@ -78,7 +79,7 @@ class DominoSelect(Scenario):
     heading: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
     x: float = param(0.0, "m", -0.4, 0.4)
     y: float = param(0.0, "m", -0.4, 0.4)
-    intact: int = param(2, "lane before the red slab, from the right", 0, RED_LANES - 1)
+    intact: int = param(2, "lane before the red slab, from the right", 0, RED_LANES - 1, answer=True)
     decoy_side: int = param(1, "-1 right, 1 left", -1, 1)
     """Side of the chain that leads to the blue slab. 0 is refuted."""
     order: int = param(0, "", 0, math.factorial(RED_LANES - 1) - 1)
@@ -193,6 +194,14 @@ class DominoSelect(Scenario):
         for i in range(1, self.count):
             scene.delete(scene.body(f"tile_{self.intact_lane}_{i}"))
         return {"no_chain": scene}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "lane": choice(self.intact_lane, "first", "second", "third"),
+            "direction": choice(spoken(self.heading), "heading"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

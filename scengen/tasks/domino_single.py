@@ -22,6 +22,7 @@ import numpy as np
 
 from ..assets.box import Domino
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, choice, near
 from ..geometry import UP, Vec3, heading, spoken
 from ..params import param
 from ..predicates import carried, displaced, touched_only
@@ -157,6 +158,14 @@ class DominoSingle(Scenario):
         for i in range(1, self.count):
             scene.delete(scene.body(f"tile_{i}"))
         return {"no_chain": scene}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "direction": choice(spoken(self.heading), "heading"),
+            "first_tile": near(self.spot(0), 0.015, "x", "y", "heading", "gap_ratio"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -37,6 +37,7 @@ import numpy as np
 from ..assets.board import Board
 from ..assets.prop import BOX, TABLE_HALF, TABLE_TOP, place, table
 from ..control.loop import Loop
+from ..decisions import Decision, choice, side_of, span
 from ..errors import GaveUp
 from ..geometry import AHEAD, UP, Mat3, Outline, Vec3, between, corners
 from ..params import param
@@ -253,6 +254,17 @@ class EdgeSlide(Scenario):
         wider = scene.body("table").add_geom(name="table_leaf", type=BOX, size=[TABLE_HALF, 0.10, 0.025])
         wider.pos = (TABLE_HALF + 0.10) * self.out
         return {"wider_table": scene}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        half, tips = self.plate.width / 2, self.plate.tipping_overhang
+        return {
+            "side": choice(self.side, "side"),
+            "hand_stops_before_the_edge": span(self.plate.width - tips, self.plate.width - 0.036, "plate"),
+            "way_of_the_push": span(self.away + 0.036 - half, self.away + tips - half, "away", "plate"),
+            "plate_turns": choice(side_of(self.yaw), "yaw"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

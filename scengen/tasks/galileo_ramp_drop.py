@@ -36,6 +36,7 @@ from ..assets.ball import Ball
 from ..assets.bin import Bin
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ramp import WALL_RISE, WALL_THICKNESS, Ramp
+from ..decisions import Decision, around
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, spoken
 from ..params import param
 from ..robots import jaw
@@ -193,6 +194,15 @@ class GalileoRampDrop(Scenario):
             return abs(share * highest - wanted) <= self.ramp.band / 2
 
         return Answer(tuple(np.linspace(0.25, 0.95, 71).round(2).tolist()), act, right, tries=1)
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        highest, wanted = self.ramp.height(self.brim), self.ramp.height(self.release_place)
+        return {
+            "share_of_the_height": around(wanted / highest, self.ramp.band / 2 / highest, "ramp.level"),
+            "height": around(wanted, self.ramp.band / 2, "ramp.level"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

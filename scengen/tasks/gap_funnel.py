@@ -39,6 +39,7 @@ from ..assets.gap_wall import GapWall, Kerb
 from ..assets.patch import Patch
 from ..assets.prop import TABLE_HALF, TABLE_TOP, place, table
 from ..control.loop import Loop
+from ..decisions import Decision, around, choice, side_of
 from ..geometry import UP, Vec3, between, heading, quat
 from ..params import param
 from ..physics import GRAVITY
@@ -222,6 +223,16 @@ class GapFunnel(Scenario):
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         return {"no_gap": replace(self, wall=replace(self.wall, gap=0.0)).build()}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        room = (self.wall.gap / 2 - self.ball.radius) / math.cos(math.radians(self.yaw))
+        return {
+            "gap": around(self.gap_y, room, "gap_y"),
+            "ball_is_drawn": choice(side_of(-self.offset), "offset", "gap_y"),
+            "ball_is_drawn_by": around(-self.offset, 0.008, "offset", "gap_y"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

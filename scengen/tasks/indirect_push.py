@@ -43,6 +43,7 @@ from ..assets.box import Cube
 from ..assets.patch import Patch
 from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..control.loop import Loop
+from ..decisions import Decision, around, choice
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, between, corners, gap, heading, least_gap
 from ..params import Bounded, param
 from ..physics import GRAVITY
@@ -246,6 +247,18 @@ class IndirectPush(Scenario):
         scene = self.build()
         scene.delete(scene.body(self.chosen[0]))
         return {"one_block_less": scene}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        rest = sorted({"block_0", "block_1", "block_2"} - set(self.chosen))
+        return {
+            "blocks": choice(self.needed, "distance", "way"),
+            "head_of_the_chain": choice(self.chosen[0], "block_0", "block_1", "block_2", "bearing"),
+            "left_over": choice(rest[0] if rest else "none", "block_0", "block_1", "block_2", "bearing"),
+            "end_of_the_push": around(self.distance + self.way, 0.018, "distance", "way"),
+            "bearing": around(self.bearing, math.degrees(0.025 / 0.92), "bearing"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -42,6 +42,7 @@ from ..assets.keyboard import LETTERS, Keyboard, disable
 from ..assets.prop import TABLE_TOP, table
 from ..assets.words import WORDS
 from ..control.loop import Loop
+from ..decisions import Decision, choice, near
 from ..geometry import UP, Vec3, about_z
 from ..params import param
 from ..predicates import KEY_MEMORY, SEVERAL_KEYS, count_time, fallen, key_that_counts, long_enough
@@ -78,7 +79,7 @@ class KeyboardTyping(Scenario):
     VERSION = 1
 
     word: int = param(0, "words", 0, len(WORDS) - 1)  # number of the word in `WORDS`
-    mine: int = param(0b01010, "1", 1, 254)
+    mine: int = param(0b01010, "1", 1, 254, answer=True)
     """Places of the word that are the agent's, one bit each; the lowest bit is the first letter."""
     hold: float = param(0.2, "s", 0.05, 1.0, hidden=True)
     """Time that a key must be touched until it counts; the move is called `motion.hold`."""
@@ -251,6 +252,19 @@ class KeyboardTyping(Scenario):
                 disable(scene, "keyboard", letter)
         return {"dead_keys_of_the_partner": scene}
 
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        first = self.keyboard.at(self.letters[self.own[0]])[:2]
+        return {
+            "starts": choice(self.owns(0), "typed_*", "* of typed"),
+            "own_places": choice(tuple(self.own), "typed_*", "* of typed"),
+            "word": choice(self.word, "typed_*", "* of typed"),
+            "first_own_key": near(
+                self.spot[:2] + about_z(math.radians(self.yaw))[:2, :2] @ first, 0.010, "typed_*", "x", "y", "yaw"
+            ),
+        }
+
     # --- constraints ------------------------------------------------------------------------
 
     def constraints(self) -> Iterator[Refutation | None]:
@@ -289,7 +303,7 @@ class KeyboardTyping(Scenario):
         return {
             "letters": len(self.letters),
             "own": len(self.own),
-            "begins": "this robot" if self.owns(0) else "the other robot",
+            "starts": "this robot" if self.owns(0) else "the other robot",
             "ends": "this robot" if self.owns(len(self.letters) - 1) else "the other robot",
         }
 

@@ -36,6 +36,7 @@ import numpy as np
 
 from ..assets.ball import Ball
 from ..assets.prop import TABLE_HALF, TABLE_TOP, place, solid, table
+from ..decisions import Decision, around, choice
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, between, heading, polar, quat, way_to
 from ..params import param
@@ -210,6 +211,16 @@ class LinearIntercept(LaunchedBall):
         bar = barred.worldbody.add_body(name="bar", pos=[at[0], at[1], TABLE_TOP + height / 2], quat=quat("z", along))
         solid(bar, "bar", np.array([length, width, height]) / 2)
         return {"barred_way": barred}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        motion = ("heading", "speed")
+        found: dict[str, Decision] = {"drifts": choice("away" if self.u[0] > 0 else "towards the robot", *motion)}
+        for line, y in (("left", 0.10), ("middle", 0.0), ("right", -0.10)):
+            x = self.start[0] + (y - self.start[1]) * self.u[0] / self.u[1]
+            found[f"x_at_the_{line}_line"] = around(x, 0.020 / abs(self.u[1]), *motion)
+        return found
 
     # --- constraints ------------------------------------------------------------------------
 

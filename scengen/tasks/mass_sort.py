@@ -33,6 +33,7 @@ import numpy as np
 from ..assets.box import Cube
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.zone import Zone
+from ..decisions import Decision, choice
 from ..geometry import UP, Outline, Vec3, corners, gap, least_gap
 from ..params import Bounded, param
 from ..predicates import fallen, held, rests_on, still
@@ -91,7 +92,7 @@ class MassSort(Scenario):
     middle: float = param(0.10, "kg", 0.02, 0.6, hidden=True)
     heavy: float = param(0.20, "kg", 0.02, 0.6, hidden=True)
     """Mass of the heaviest cube; paper, App. B: 50, 100 and 200 g."""
-    order: int = param(3, "", 0, 5, hidden=True)  # index in `ORDERS` of the cubes' order
+    order: int = param(3, "", 0, 5, hidden=True, answer=True)  # index in `ORDERS` of the cubes' order
     edge: float = param(0.045, "m", 0.02, 0.07)
     friction: float = param(0.6, "1", 0.2, 1.5)
     mirrored: int = param(0, "", 0, 1)  # 1 if the zone of the lightest cube is on the right
@@ -268,6 +269,17 @@ class MassSort(Scenario):
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """The scene looks the same, with the lightest and the heaviest cube exchanged."""
         return {"masses_exchanged": replace(self, light=self.heavy, heavy=self.light).build()}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        masses = ("light", "middle", "heavy")
+        return {
+            "lightest": choice(self.ranks.index(0), *masses),
+            "heaviest": choice(self.ranks.index(2), *masses),
+            "order": choice(tuple(self.ranks), *masses),
+            "side_of_the_light_zone": choice(self.mirrored, "*zone*.y", "*zone*redness", "*zone*lightness"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

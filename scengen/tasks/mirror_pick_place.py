@@ -40,6 +40,7 @@ import numpy as np
 
 from ..assets.bar import Bar
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, choice, near, side_of
 from ..geometry import UP, Vec3, corners
 from ..orientation import UPRIGHT, VIEW_CENTRE, Orientation
 from ..params import param
@@ -178,6 +179,15 @@ class MirrorPickPlace(Scenario):
                 break
             yield steer(arm, arm.hand, FINE.speed * way / np.linalg.norm(way), np.zeros(3), OPEN)
         yield from self._pick(world, self._below(arm.hand))
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "side": choice(side_of(self.y), "x", "y"),
+            "cube": near(self.spot, 0.010, "x", "y"),
+            "hand_turns": choice(side_of(self.yaw), "yaw"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -38,6 +38,7 @@ import numpy as np
 from ..assets.box import Cube, Lid
 from ..assets.patch import Patch
 from ..assets.prop import CAMERAS, TABLE_TOP, Rgba, place, table
+from ..decisions import Decision, choice, near
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap, least_gap
 from ..params import Bounded, param
 from ..predicates import fallen, over, rests_on, still
@@ -81,9 +82,10 @@ class OccluderPush(Scenario):
     """Three covered cubes and a green patch."""
 
     VERSION = 1
+    CONCEALED = ("cube_*",)
     HOLD = 0.3
 
-    red: int = param(1, "0 left, 1 middle, 2 right", 0, CUBE_COUNT - 1, hidden=True)
+    red: int = param(1, "0 left, 1 middle, 2 right", 0, CUBE_COUNT - 1, hidden=True, answer=True)
     likeness: int = param(0, "0 = blue and yellow, 1 = orange and magenta", 0, 1)  # colours of the other two cubes
     lids: int = param(1, "lids", 1, 5)  # number of lids on each cube
     left: Spot = Spot(y=0.235)
@@ -249,6 +251,11 @@ class OccluderPush(Scenario):
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """The scene looks the same, with the red cube under the next lid."""
         return {"red_elsewhere": replace(self, red=(self.red + 1) % CUBE_COUNT).build()}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {"red": choice(self.red), "patch": near(self.goal, 0.033, "patch_x", "patch_y")}
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -44,6 +44,7 @@ from ..assets.bin import Bin
 from ..assets.guillotine import Ell
 from ..assets.l_piece import LPiece
 from ..assets.prop import TABLE_TOP, Rgba, place, table
+from ..decisions import Decision, around, choice, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, corners, least_gap, way_to, yaw_of
 from ..params import Bounded, param
@@ -95,8 +96,8 @@ class Packing(Scenario):
     low: int = param(2, "units", 2, 4)
     rise: int = param(1, "units", 1, 3)
     top: int = param(2, "units", 2, 4)
-    mirror: int = param(0, "1", 0, 1)
-    deal: int = param(0, "", 0, 5)
+    mirror: int = param(0, "1", 0, 1, answer=True)
+    deal: int = param(0, "", 0, 5, answer=True)
     """Number of the permutation that assigns the first three slots to `piece_0`, `piece_1` and `piece_2`."""
     clearance: float = param(0.0010, "m", 0.0002, 0.002)
     thickness: float = param(0.020, "m", 0.008, 0.04)
@@ -244,6 +245,20 @@ class Packing(Scenario):
         i, other = guillotine.misfit(*self.cut)
         pieces = [*self.pieces[:i], self.shape(other, COLOURS[i]), *self.pieces[i + 1 :]]
         return {"a_piece_that_does_not_fit": self._scene(pieces)}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        sizes = ("left", "right", "low", "rise", "top", "*width*", "*length*")
+        found: dict[str, Decision] = {"arrangement": choice((self.mirror, self.deal), *sizes)}
+        for i in range(self.count):
+            (at, yaw), (_, begins) = self.goal(i), self.start(i)
+            across = about_z(-math.radians(self.heading)) @ (at - [self.x, self.y, 0.0])
+            turn = math.degrees(math.remainder(yaw - begins, math.tau))
+            found[f"slot_of_piece_{i}"] = choice((bool(across[0] > 0), bool(across[1] > 0)), *sizes)
+            found[f"piece_{i}_turns"] = choice(side_of(turn), f"spot_{i}.turn")
+            found[f"turn_of_piece_{i}"] = around(turn, 22.0, f"spot_{i}.turn")
+        return found
 
     # --- constraints ------------------------------------------------------------------------
 

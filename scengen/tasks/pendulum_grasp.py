@@ -42,6 +42,7 @@ from ..assets.pendulum import Pendulum
 from ..assets.prop import TABLE_TOP, place, table
 from ..compat import set_damping
 from ..control.loop import Loop
+from ..decisions import Decision, choice, near, side_of, span
 from ..geometry import UP, Mat3, Vec3, between, corners, heading, polar, spoken
 from ..params import param
 from ..predicates import still
@@ -256,6 +257,20 @@ class PendulumGrasp(Scenario):
             return abs(math.remainder(moment + self.closing_time - turns, self.period)) <= self.window / 2
 
         return Answer(tuple(np.arange(3.0, 6.0, 0.02).round(2).tolist()), act, right, tries=1)
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        angle, half = math.tau / self.period, self.window / 2
+        turns = (0.5 - self.phase / 360.0) * self.period - self.closing_time
+        first = 3.0 + (turns - 3.0) % self.period
+        late, early = (self.amplitude * math.cos(angle * (self.closing_time + sign * half)) for sign in (1, -1))
+        return {
+            "angle_at_which_to_close": span(late, early, "pendulum", "amplitude"),
+            "time_at_which_to_close": span(first - half, first + half, "phase", "pendulum"),
+            "apex": near(self.bob_at(-self.peak_angle), 0.012, "pivot_x", "pivot_y", "plane", "pendulum", "amplitude"),
+            "starts_to": choice(side_of(math.sin(math.radians(self.phase))), "phase"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

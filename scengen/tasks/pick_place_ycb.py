@@ -35,6 +35,7 @@ import numpy as np
 from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
+from ..decisions import Decision, choice, near
 from ..geometry import UP, Vec3, heading, way_to
 from ..params import param
 from ..predicates import fallen, held, over, rests_on, still
@@ -217,6 +218,16 @@ class PickPlaceYcb(Scenario):
         yield from take(world.arm, "thing", lift=CARRY_HEIGHT)
         back = self.start - self.spots[0]
         yield from self.set_down(world, self.spots[0] + (self.near + 0.02) * back / np.linalg.norm(back))
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        spots = self.spots() if callable(self.spots) else self.spots
+        return {
+            "jumps": choice(self.jumps),
+            "second_square": near(spots[1], 0.035),
+            "last_square": near(spots[-1], 0.035),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

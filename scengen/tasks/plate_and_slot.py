@@ -11,6 +11,7 @@
 """
 
 import math
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Generic, TypeVar
 
@@ -22,6 +23,7 @@ from ..assets.plate import Plate
 from ..assets.prop import TABLE_HALF, TABLE_TOP, place, table
 from ..assets.slot_shelf import SlotShelf
 from ..control.loop import Loop
+from ..decisions import Decision, choice, near, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, between, corners, shortest
 from ..predicates import fallen
@@ -233,6 +235,16 @@ class PlateAndSlot(Scenario, Generic[PlateT]):
     def seat(self, world: World) -> Vec3:
         """Position under the plate's middle in the slot [m]: with its foot at a divider, fingers fit on its lip."""
         return self.foot - (self.slack / 2 - FOOT_CLEARANCE) * self.across(world)
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "shelf_is_turned": choice(side_of(self.shelf_yaw), "shelf_yaw"),
+            "size": choice(round(self.plate.radius, 3), "plate"),
+            "side_that_is_taken": choice(self.side, "plate_x", "plate_y", "shelf_x", "shelf_y", "shelf_yaw"),
+            "seat": near(self.foot, max(0.002, self.slack), "shelf_x", "shelf_y"),
+        }
 
     # --- geometry -------------------------------------------------------------------------
 

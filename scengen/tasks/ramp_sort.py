@@ -37,6 +37,7 @@ from ..assets.barrier import Barrier, let_pass
 from ..assets.bin import Bin
 from ..assets.crowned_ramp import CrownedRamp
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, choice, near, side_of, span
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
 from ..params import param
@@ -77,7 +78,7 @@ class RampSort(Scenario):
 
     reds: int = param(2, "balls", 1, 3)
     blues: int = param(2, "balls", 1, 3)
-    arrangement: int = param(0, "index", 0, math.comb(MAX_BALLS, MAX_BALLS // 2) - 1)
+    arrangement: int = param(0, "index", 0, math.comb(MAX_BALLS, MAX_BALLS // 2) - 1, answer=True)
     """Index, among all choices of places in the row, of the choice for the red balls."""
     red_side: int = param(-1, "1 left, -1 right", -1, 1)  # side of the ridge on which the red bin is; 0 is refuted
     x: float = param(0.02, "m", -0.3, 0.3)
@@ -259,6 +260,19 @@ class RampSort(Scenario):
         bare = self.build()
         bare.delete(bare.body("ramp"))
         return {"no_ramp": bare, "bins_exchanged": self._scene(-self.red_side)}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        colours = ("ball_*.redness", "ball_*.lightness", "*ness of ball", "*_bin.*", "red_side")
+        sides = [side_of(self.red_side if red else -self.red_side) for red in self.colours]
+        low, high = self.ramp.ridge + self.band, self.ramp.width / 2 - self.ball.radius
+        return {
+            **{f"side_of_ball_{i}": choice(side, *colours) for i, side in enumerate(sides)},
+            "side_of_red": choice(self.red_side, "*_bin.*", "red_side"),
+            "release_to_the_left": span(low, high, "ramp.ridge"),
+            "ramp": near((self.x, self.y), 0.020, "x", "y"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -46,6 +46,7 @@ import numpy as np
 from ..assets.peg import Peg, Plinth
 from ..assets.prop import TABLE_TOP, place, servo, table
 from ..assets.slot_board import PLATE_THICKNESS, STIFFNESS, SlotBoard
+from ..decisions import Decision, around, choice, near, side_of
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap, heading, polar, way_to
 from ..params import param
 from ..predicates import fallen
@@ -248,6 +249,17 @@ class RecoverPegInsert(Scenario):
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         return {"no_slot": self._scene(replace(self.board, plugged=True))}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        shift = self.board.pivot * math.sin(math.radians(abs(self.turn)))
+        return {
+            "board_turns": choice(side_of(self.turn)),
+            "mouth_shifts_by": around(shift, 0.002, "board"),
+            "side_of_the_board": choice(self.side, "side"),
+            "first_mouth": near(self.mouth, 0.010, "mouth_x", "mouth_y"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -27,6 +27,7 @@ import numpy as np
 
 from ..assets.ridge import Ridge
 from ..assets.rod import SLUG_EDGE, Rod
+from ..decisions import Decision, around, choice, near, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, gap, shortest, way_to
 from ..params import param
@@ -215,6 +216,15 @@ class RodAcross(RodAndRidge[Rod]):
         scene.delete(scene.geom("stand/wall"))
         elsewhere = replace(self, rod=replace(self.rod, com=-self.rod.com))
         return {"no_ridge": scene, "slug_elsewhere": elsewhere.build()}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "heavy_end": choice(side_of(self.rod.com)),
+            "place_along_the_rod": around(self.rod.com, self.ridge.width / 2),
+            "ridge": near(self.foot, 0.006, "ridge_x", "ridge_y", "ridge_yaw"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -39,6 +39,7 @@ import numpy as np
 from ..assets.box import Block
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.seesaw import Seesaw, standing
+from ..decisions import Decision, around, choice, near
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, compound, heading, quat, spoken
 from ..params import param, with_values
@@ -254,6 +255,18 @@ class SeesawBalance(Scenario):
         scene = self.build()
         scene.delete(scene.body("weight"))
         return {"no_counterweight": scene}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        at = np.array([self.x, self.y, 0.0]) + self.balance * heading(self.heading)
+        masses = ("target.mass", "weight.mass", "seesaw.mass")
+        return {
+            "arm_beside_the_target": choice("other" if self.raised * self.offset < 0 else "the same", *masses),
+            "place_on_the_arm": around(abs(self.balance), self.margin, *masses),
+            "place_on_the_table": near(at, self.margin, *masses),
+            "beyond_the_target": choice(bool(abs(self.balance) > abs(self.offset)), *masses),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

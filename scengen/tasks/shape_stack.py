@@ -33,6 +33,7 @@ import numpy as np
 
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.shape import CONE_SLOPE, CYLINDER, FRUSTUM, HEXAGON, TRIANGLE, Shape
+from ..decisions import Decision, choice
 from ..geometry import UP, Vec3, about_z
 from ..params import Bounded, param
 from ..predicates import fallen, still
@@ -88,8 +89,10 @@ class ShapeStack(Scenario):
     NO_ABLATIONS = "every shape is part of what is asked for: none can be taken away"
 
     count: int = param(4, "", 3, 5)  # number of shapes: the cone, and others from the first place on
-    cone_at: int = param(1, "", 0, 4)  # index of the cone's place
-    deal: int = param(0, "", 0, 23)  # index of the permutation of the other four shapes over the other places
+    cone_at: int = param(1, "", 0, 4, answer=True)  # index of the cone's place
+    deal: int = param(
+        0, "", 0, 23, answer=True
+    )  # index of the permutation of the other four shapes over the other places
     perched: int = param(0, "", 0, 1)  # 1: the cone starts on the widest shape, and its place is free
     cone: Shape = Shape(kind=FRUSTUM, width=0.042, height=0.041)
     cube: Shape = Shape()
@@ -212,6 +215,17 @@ class ShapeStack(Scenario):
             yield from self.pile(world, [*(name for name in self.order if name != top), top])
 
         return Answer((0.0, 1.0, 2.0), last, lambda number: names[round(number)] == self.order[-1], tries=1)
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        widths = ("*width*", "*length*")
+        return {
+            "last": choice(self.order[-1]),
+            "base": choice(self.order[0], *widths),
+            "second": choice(self.order[1], *widths),
+            "shapes": choice(self.count, "count"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -47,6 +47,7 @@ from ..assets.package import Carton
 from ..assets.prop import CAMERAS, TABLE_TOP, aim, place, table
 from ..assets.rack import STOREYS, TierRack
 from ..assets.ycb import Ycb
+from ..decisions import Decision, around, choice, near, side_of
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
 from ..params import param
 from ..predicates import fallen, rests_on, still
@@ -90,6 +91,7 @@ class ShelteredGrasp(Scenario):
     """An object in a rack that is open on one side, and a tray on the table before it."""
 
     VERSION = 1
+    CONCEALED = ("thing",)
     HOLD = 0.3
 
     side: int = param(1, "1 left, -1 right", -1, 1)
@@ -231,6 +233,17 @@ class ShelteredGrasp(Scenario):
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         return {"closed_rack": self._scene(replace(self.rack, closed=True))}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "storey": choice(self.storey),
+            "along": around(self.along, (0.080 - float(self.thing.size[0])) / 2),
+            "side": choice(self.side, "side"),
+            "tray": near(self.tray, 0.045, "tray_x", "tray_y"),
+            "hand_turns": choice(side_of(math.remainder(self._azimuth - math.pi / 2, math.tau)), "side", "rack_yaw"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -40,6 +40,7 @@ from ..assets.box import Cube
 from ..assets.catch_bin import CatchBin
 from ..assets.incline import Incline, Load, LoadedIncline, driven
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, around, choice, near
 from ..geometry import UP, Vec3, about_z, yaw_of
 from ..params import param
 from ..predicates import fallen, still
@@ -69,7 +70,7 @@ class SlideCatch(Scenario):
     HOLD = 0.5
     MOVING = ("block_0", "block_1", "block_2")
 
-    order: int = param(0, "", 0, len(ORDERS) - 1)  # index in `ORDERS` of the lanes in which the blocks lie
+    order: int = param(0, "", 0, len(ORDERS) - 1, answer=True)  # index in `ORDERS` of the lanes in which the blocks lie
     low: Load = Load(friction=0.277, away=0.022)
     middle: Load = Load(friction=0.53, away=0.032)
     high: Load = Load(friction=0.87, away=0.040)
@@ -237,6 +238,18 @@ class SlideCatch(Scenario):
         exchanged = list(self.loads)
         exchanged[lowest], exchanged[highest] = exchanged[highest], exchanged[lowest]
         return {"frictions_exchanged": self._scene(exchanged)}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        first, loads = self.ramp.sequence[0], ("block_*.redness", "block_*.lightness", "*ness of block")
+        return {
+            "first_lane": choice(first, *loads),
+            "last_lane": choice(self.ramp.sequence[-1], *loads),
+            "sequence": choice(tuple(self.ramp.sequence), *loads),
+            "time_of_the_first": around(self.ramp.slide_start(first), 0.3, "start", "rate"),
+            "bin_below_the_first": near(self.bin_at(self.ramp.spot(first)[1]), 0.020, "y", "lane"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -42,6 +42,7 @@ import numpy as np
 from ..assets.patch import Patch
 from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
+from ..decisions import Decision, choice, near, span
 from ..geometry import UP, Vec3, heading, way_to
 from ..params import param
 from ..physics import GRAVITY
@@ -298,6 +299,18 @@ class SlipRecovery(Scenario):
             yield from go_to(world.arm, low + there * along)
             yield from (grasp if closed else release)(world.arm)
             yield from go_to(world.arm, low + high + there * along)
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        room = (0.08 - (self.thing.row.width or 0.08)) / 2
+        lies, way = self.distance(0) + 0.018, (self.goal - self.start) / np.linalg.norm(self.goal - self.start)
+        return {
+            "lies_after": span(lies - room, lies + room),
+            "lies_at": near(self.start + lies * way, room),
+            "slips": choice(self.slips),
+            "object": choice(self.thing.item, "thing"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

@@ -40,6 +40,7 @@ import numpy as np
 from ..assets.box import Cube, LoadedCube
 from ..assets.prop import TABLE_TOP, place, table
 from ..control.loop import Loop
+from ..decisions import Decision, choice, near, side_of
 from ..geometry import UP, Vec3, heading
 from ..params import Bounded, param
 from ..physics import stopping_speed, thrown_off
@@ -212,6 +213,15 @@ class StackCollapseRecovery(Scenario):
         yield from carry(world.arm, "top", at + CARRY_HEIGHT * UP, pace=CARRY_PACE)
         yield from carry(world.arm, "top", at)
         yield from let_go(world.arm)
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "fallen_cubes": choice(1 + self.blow_0.both),
+            "side_of_the_top_cube": choice(side_of(math.sin(math.radians(self.blow_0.heading)))),
+            "top_lies_at": near(self.spots(self.blow_0)[0], 0.012),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

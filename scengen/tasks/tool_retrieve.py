@@ -32,6 +32,7 @@ import numpy as np
 from ..assets.box import Cube
 from ..assets.hook import Hook, JHook, LHook, THook
 from ..assets.prop import TABLE_TOP, place, table
+from ..decisions import Decision, choice, near, side_of
 from ..geometry import UP, Vec3, about_y, about_z, corners, heading, polar, way_to
 from ..params import param
 from ..predicates import fallen, held
@@ -216,6 +217,17 @@ class ToolRetrieve(Scenario):
         for i in range(1, len(self.tool.bars)):
             straight.delete(straight.geom(f"hook/bar_{i}"))
         return {"no_hook": bare, "no_tip": straight}
+
+    # --- decisions ---------------------------------------------------------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        return {
+            "tip_to": choice(side_of(0.5 - self.hook.mirrored), "hook", "hook_yaw"),
+            "hook_lies_on_the": choice(side_of(self.hook_y), "hook_y"),
+            "side_of_the_cube": choice(side_of(self.bearing), "bearing"),
+            "cube": near(self.spot, 0.020, "distance", "bearing"),
+            "hand_on_the_hook": near((self.hook_x, self.hook_y), 0.010, "hook_x", "hook_y"),
+        }
 
     # --- constraints ------------------------------------------------------------------------
 

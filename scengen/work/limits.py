@@ -5,6 +5,7 @@ from ..errors import BadConfig, cut
 MAX_SETTINGS = {
     "budget": 10_000_000,
     "any_n": 1_000_000,
+    "axis_n": 100_000,
     "attack": 1_000_000,
     "chunk": 1000,
     "comparisons": 1_000_000,

@@ -15,6 +15,7 @@ import numpy as np
 from scengen.assets.box import Block, Cube
 from scengen.assets.patch import Patch
 from scengen.assets.prop import TABLE_TOP, place, table
+from scengen.decisions import Decision, around
 from scengen.geometry import UP, Vec3, heading
 from scengen.params import param
 from scengen.predicates import fallen, inside, still
@@ -117,6 +118,16 @@ class PushOff(Scenario):
         scene = self.build()
         scene.delete(scene.body("block"))
         return {"no_block": scene}
+
+    # --- decisions: what a solution depends on, for scengen axis cues -----------------------------
+
+    def decisions(self) -> Mapping[str, Decision]:
+        """How far and in which direction the cube must move, and the parameters that this is meant to follow from."""
+        room = (self.zone.size - self.cube.edge) / 2
+        return {
+            "distance": around(self.distance, room, "distance"),
+            "direction": around(self.heading, math.degrees(room / self.distance), "heading"),
+        }
 
     # --- constraints: refute invalid parameters before anything is simulated ----------------------
 

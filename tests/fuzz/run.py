@@ -133,6 +133,7 @@ WORK = (
     "scengen.cli.commands.edition.differences",
     "scengen.cli.commands.measure.measure",
     "scengen.cli.commands.axis_discover.discover",
+    "scengen.cli.commands.axis_cues.audit",
     "scengen.export.recording._writer",
     "scengen.export.hub.publish",
     "scengen.envs.agreement.compare_all",

@@ -39,12 +39,28 @@ def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Ta
     Raises:
         ScengenError: one line that says what is wrong.
     """
-    plain, choices = composed(verb, overrides)
-    settings = typed("", kind, _settings(verb, plain))
-    task = load(choices["task"], plain["task"])
+    settings, task, plain, choices = _read_with_task(verb, overrides, kind)
     certify_settings = typed("certify", CertifySettings, certify_node(plain["certify"], task, choices["certify"]))
     certify_settings.check()
     return settings, task, certify_settings
+
+
+def read_uncertified(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Task]:
+    """Read the settings of a command with a task that certifies nothing, and the task.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    settings, task, *_ = _read_with_task(verb, overrides, kind)
+    return settings, task
+
+
+def _read_with_task(
+    verb: str, overrides: Sequence[str], kind: type[T]
+) -> tuple[T, Task, Mapping[str, Any], Mapping[str, str]]:
+    """Settings, task, all that was composed, and the names of the files that were chosen."""
+    plain, choices = composed(verb, overrides)
+    return typed("", kind, _settings(verb, plain)), load(choices["task"], plain["task"]), plain, choices
 
 
 def task_overrides(overrides: Sequence[str]) -> list[str]:
