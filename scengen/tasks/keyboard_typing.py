@@ -303,7 +303,7 @@ class KeyboardTyping(Scenario):
         return {
             "letters": len(self.letters),
             "own": len(self.own),
-            "starts": "this robot" if self.owns(0) else "the other robot",
+            "begins": "this robot" if self.owns(0) else "the other robot",
             "ends": "this robot" if self.owns(len(self.letters) - 1) else "the other robot",
         }
 
