@@ -186,8 +186,8 @@ class Search:
         model.fit(self.sample.columns(fair), self.answers.learned)
 
         def guesses(sample: Sample) -> Sequence[Any]:
-            revealed = model.predict(sample.columns(fair))
-            return [self.answers.labels[k] for k in revealed] if isinstance(self.answers, Choices) else revealed
+            answers = model.predict(sample.columns(fair))
+            return [self.answers.labels[k] for k in answers] if isinstance(self.answers, Choices) else answers
 
         return self._rule(f"all {len(fair)} unintended quantities", tuple(fair), guesses)
 
