@@ -200,7 +200,7 @@ class Gr00t(Server):
     def __init__(self, address: Address, client: ClientSettings):
         super().__init__(address, client)
         self._zmq = _library("zmq")
-        self._context = self._zmq.Context()
+        self._context = self._zmq.Context.instance()  # garbage collection of a context waits for its sockets
         self._socket: Any = None
 
     def infer(self, observation: Mapping[str, Any]) -> Mapping[str, Any]:
