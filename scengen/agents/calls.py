@@ -151,7 +151,7 @@ class Calls:
         return record
 
     def _count(self, told: tuple[int, int], estimated: tuple[int, int]) -> None:
-        """Count a call. Token counts that a model does not report are estimated, so that it does not pass a limit unseen."""
+        """Count a call. Missing token counts are estimated, so that a call does not pass a limit unseen."""
         self.new, self.tokens = self.new + 1, self.tokens + sum(told)
         counted = told if all(told) else estimated
         self._counted += sum(counted)

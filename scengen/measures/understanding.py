@@ -36,7 +36,7 @@ class Plans(Measurement):
     The plan of facts/<task>.yaml is played in n feasible training scenarios, with and without its optional sub-goals.
     Wrong plans are played in the first `wrong` ones: with a required sub-goal missing, with two neighbours that have an
     order exchanged, and with a wrong sub-goal in place of all or in place of the second half. The last kind counts if
-    the wrong sub-goal was started, because nothing is wrong where the goal is reached before it. Tasks without moves for
+    the wrong sub-goal was started, because nothing is wrong if the goal is reached first. Tasks without moves for
     sub-goals are left out.
     """
 

@@ -1,7 +1,7 @@
 """Connections to policy servers: keys, addresses of a name, and descriptions that change."""
 
-import socket
 import gc
+import socket
 import threading
 from contextlib import contextmanager
 

@@ -1,4 +1,4 @@
-"""The files of a recording without rows, compared with its rows: statistics, instructions, and the table of episodes."""
+"""The other files of a recording, compared with its rows: statistics, instructions, and the table of episodes."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,1 +1,1 @@
-"""Cue audit: which visible quantities reveal a decision of a task in training although they are not the intended ones."""
+"""Cue audit: visible quantities that reveal a decision of a task although they are not the intended ones."""
