@@ -168,7 +168,7 @@ def test_a_manifest_with_another_operator_than_a_code_is_refused(mine, operator,
     [
         ({"operator": "anna"}, "operator = anna; give a code such as op7, not a name"),
         ({"device": "gamepda"}, "no device named 'gamepda' (did you mean 'gamepad'?); known: gamepad, keyboard"),
-        ({"device": "script:none.jsonl"}, "none.jsonl cannot be read: no such file or directory"),
+        ({"device": "script:none.jsonl"}, "none.jsonl cannot be read: it is missing"),
         ({"device": "no_module:Pad"}, "device = no_module:Pad; there is no module 'no_module' on the path"),
         ({"device": "pads:Nobody"}, "device = pads:Nobody; pads has no function or class named 'Nobody'"),
         ({"device": "pads:Hands", "n": 1}, "its method read fails (NotImplementedError: ); the fault is the device's"),
