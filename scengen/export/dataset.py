@@ -5,10 +5,12 @@ A recording may be untrusted: only plain files in its folder are opened, and wha
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from io import BufferedReader
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..episode import STRICT, Rules, check_rules
-from ..errors import BadConfig, PoolError, ScengenError
+from ..errors import BadConfig, PoolError, ScengenError, cut
 from ..pool.files import MAX_JSON
 from ..pool.kinds import check_one
 from ..pool.shards import check_groups
@@ -26,7 +28,7 @@ from ..pool.untrusted import READING_MEMORY
 from ..work.machine import memory_bounded
 from ..work.plain import open_plain
 from .lerobot import VIDEO_PATH
-from .schema import check_episode, check_film, check_info
+from .schema import TEXT, check_episode, check_film, check_info, is_instruction
 
 TASK_VERSION = "scengen/task_version"
 """Column of the table of episodes with the version of the task. Recordings of earlier releases lack it."""
@@ -38,6 +40,8 @@ MAX_ROWS = 50_000_000
 """Largest number of rows of a table that is read."""
 MAX_PIXELS = 4096 * 4096
 """Largest size of a picture that is decoded [pixels]."""
+_KINDS = {"float": pa.types.is_floating, "int": pa.types.is_integer, "bool": pa.types.is_boolean}
+"""Kinds of numbers by the beginning of their names in `meta/info.json`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +55,7 @@ class EpisodeData:
     """Columns by name, each of shape (rows, ...)."""
 
     def __len__(self) -> int:
-        return len(self.columns["frame_index"])
+        return int(self.about["dataset_to_index"]) - int(self.about["dataset_from_index"])
 
     @property
     def task(self) -> str:
@@ -157,8 +161,12 @@ class Recording:
     @cached_property
     def tasks(self) -> dict[int, str]:
         """Instructions by their number."""
-        rows = self._table(self.folder / "meta" / "tasks.parquet").to_pylist()
-        return {row.get("task_index"): row.get("task") for row in rows}
+        path = self.folder / "meta" / "tasks.parquet"
+        rows = self._table(path).to_pylist()
+        found = {row["task_index"]: row["task"] for row in rows if is_instruction(row)}
+        if len(found) != len(rows):
+            raise PoolError(f"{path}: every line must have a task, and a task_index of its own; record it again")
+        return found
 
     @cached_property
     def _files(self) -> list[tuple[Path, int]]:
@@ -187,13 +195,13 @@ class Recording:
         files = sorted((self.folder / "data").glob("*/*.parquet"))
         if not files:
             raise PoolError(f"{self.folder} has no rows; record it again")
-        whole = pa.concat_tables([self._table(file) for file in files])
+        whole = self._rows(files)
         for number, about in enumerate(self.episodes):
             start, end = int(about["dataset_from_index"]), int(about["dataset_to_index"])
             if not 0 <= start < end <= whole.num_rows or end - start > MAX_FRAMES:
                 raise PoolError(f"{self.folder}: episode {number} has rows {start} to {end} of {whole.num_rows}")
             part = whole.slice(start, end - start)
-            columns = {name: self._values(part[name], name) for name in part.column_names}
+            columns = {n: self._values(part[n], n) for n in part.column_names if n not in self.texts}
             yield EpisodeData(number, about, columns)
 
     def frames(self, episode: EpisodeData, camera: str) -> Iterator[NDArray[np.uint8]]:
@@ -241,16 +249,39 @@ class Recording:
             why = " ".join(str(error).split())[:120]
             raise PoolError(f"{path} cannot be read: {why}; restore it, with cp -rL if it consists of links") from None
 
+    @cached_property
+    def texts(self) -> list[str]:
+        """Columns of rows that hold texts. They are not read."""
+        return [name for name, feature in self.info["features"].items() if feature["dtype"] == TEXT]
+
+    def _rows(self, files: Sequence[Path]) -> pa.Table:
+        """The rows of some files."""
+        try:
+            return pa.concat_tables([self._table(file) for file in files])
+        except pa.ArrowException:
+            raise PoolError(f"{self.folder / 'data'}: the files have different columns; record it again") from None
+
     def _values(self, column: pa.ChunkedArray, name: str) -> NDArray[Any]:
-        shape = tuple(self.info["features"].get(name, {}).get("shape", ()))
+        """A column as an array of the kind and the shape that `meta/info.json` says; a number has no shape.
+
+        Raises:
+            PoolError: it has another kind or shape, or empty cells.
+        """
+        feature = self.info["features"].get(name, {})
+        shape = tuple(feature.get("shape", ()))
         flat, kind = column.combine_chunks(), column.type
         while pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind):
             flat, kind = flat.flatten(), kind.value_type
-        values = flat.to_numpy(zero_copy_only=False)
+        told, is_kind = feature.get("dtype"), next((k for k, test in _KINDS.items() if test(kind)), None)
+        if is_kind is None or (told and not str(told).startswith(is_kind)):
+            wanted = f"meta/info.json says {cut(str(told))}" if told else "only numbers are read"
+            raise PoolError(f"{self.folder}: column {cut(name)} holds {cut(str(kind))}, {wanted}; record it again")
         size = (len(column), *shape) if column.type != kind else (len(column),)
-        if values.size != np.prod(size):
-            raise PoolError(f"{self.folder}: column {name} has not the shape of meta/info.json; record it again")
-        return values.reshape(size)
+        if len(flat) != prod(size) or prod(shape) != prod(size[1:]):
+            raise PoolError(f"{self.folder}: column {cut(name)} has not the shape of meta/info.json; record it again")
+        if flat.null_count and is_kind != "float":
+            raise PoolError(f"{self.folder}: column {cut(name)} has empty cells; record it again")
+        return flat.to_numpy(zero_copy_only=False).reshape(size)
 
     def _table(self, path: Path) -> pa.Table:
         try:
@@ -258,6 +289,8 @@ class Recording:
                 if file.metadata.num_rows > MAX_ROWS:
                     raise ValueError(f"it has {file.metadata.num_rows} rows; at most {MAX_ROWS} are read")
                 check_groups(file.metadata, range(file.num_row_groups))
+                if double := [name for name, count in Counter(file.schema_arrow.names).items() if count > 1]:
+                    raise ValueError(f"it has two columns {double[0]}")
                 with memory_bounded(READING_MEMORY):
                     return file.read(use_threads=False)
         except (OSError, ValueError, MemoryError, pa.ArrowException) as error:

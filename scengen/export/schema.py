@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from math import prod
 from typing import Any, TypeVar
 
 from ..errors import BadConfig, cut
@@ -12,6 +13,10 @@ T = TypeVar("T")
 
 MAX_FPS = 1000
 """Largest rate of rows [1/s]."""
+MAX_ENTRIES = 2**20
+"""Largest number of entries of a column in a row."""
+TEXT = "string"
+"""LeRobot's name of the type of columns that hold texts."""
 MAX_ROW = 2**40
 """Bound of the numbers of rows, files and frames."""
 
@@ -62,12 +67,20 @@ def check_info(info: Mapping[str, Any]) -> Info:
     if found.robot_type not in EMBODIMENTS:
         told = f"robot_type = {cut(repr(found.robot_type))}; it must be {', '.join(EMBODIMENTS)}"
         raise BadConfig(f"meta/info.json: {told}")
+    for name, column in found.features.items():
+        if not all(size >= 1 for size in column.shape) or prod(column.shape) > MAX_ENTRIES:
+            raise BadConfig(f"meta/info.json: features.{cut(name)}.shape = {cut(str(column.shape))}")
     return found
 
 
 def check_episode(number: int, row: Mapping[str, Any]) -> None:
     """Raise `BadConfig` unless a row of the table of episodes has the columns that are read, with their types."""
     _check_columns(number, row, EPISODE)
+
+
+def is_instruction(row: Mapping[str, Any]) -> bool:
+    """Whether a row of `meta/tasks.parquet` has the number and the text of an instruction."""
+    return type(row.get("task_index")) is int and isinstance(row.get("task"), str)
 
 
 def check_film(number: int, row: Mapping[str, Any], camera: str) -> None:

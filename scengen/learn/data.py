@@ -170,6 +170,8 @@ def _columns(recording: Recording, streams: Sequence[str]) -> dict[str, tuple[st
             raise UnknownName("recorded stream", stream, known)
         column, feature = known[stream]
         found[column] = entry_names(stream, feature["names"], feature["shape"])
+        if len(found[column]) != prod(feature["shape"]):
+            raise PoolError(f"{recording.folder}: {column} has not one name for each entry; record it again")
     return found
 
 
@@ -184,7 +186,10 @@ def _trajectory(recording: Recording, episode: EpisodeData, columns: Iterable[st
 
 def _values(episode: EpisodeData, columns: Iterable[str]) -> NDArray[np.float32]:
     """Columns of an episode side by side, shape (rows, entries)."""
-    found = [episode.columns[name].reshape(len(episode), -1) for name in columns]
+    names = list(columns)
+    if missing := [name for name in names if name not in episode.columns]:
+        raise PoolError(f"episode {episode.number} lacks the column {missing[0]}; record it again")
+    found = [episode.columns[name].reshape(len(episode), -1) for name in names]
     return np.concatenate(found, axis=1, dtype=np.float32)
 
 

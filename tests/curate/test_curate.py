@@ -399,6 +399,11 @@ def test_the_score_of_a_person_wins(mine):
     ("name", "lines", "says"),
     [
         ("scores.csv", ["episode,score", "1,9"], "line 2: score = '9'; it must be 1 to 5"),
+        ("scores.csv", ["episode,score", "1,12"], "line 2: score = '12'; it must be 1 to 5"),
+        ("scores.csv", ["episode,score", "1,12345"], "score = '12345'; it must be 1 to 5"),
+        ("scores.csv", ["episode,score", "0000000001234,3"], "episode = '0000000001234'; it must be 0 to 3"),
+        ("scores.csv", ["episode,score", "1,4", "01,5"], "line 3"),
+        ("decisions.csv", ["episode,verdict,who,why", "1,accept,,", "1,reject,,"], "line 3"),
         ("scores.csv", ["episode,points", "1,5"], "lacks the column score"),
         ("decisions.csv", ["episode,verdict,who,why", "1,maybe,,"], "it must be accept or reject"),
         ("decisions.csv", ["episode,verdict,who,why", "44,accept,,"], "episode = '44'; it must be 0 to 3"),

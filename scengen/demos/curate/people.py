@@ -22,6 +22,8 @@ VERDICTS = ("accept", "reject")
 """Verdicts of people."""
 MAX_CSV = 1_000_000
 """Size of the largest table of people that is read [bytes]."""
+MAX_DIGITS = 9
+"""Number of digits of the largest number of an episode, without leading zeros."""
 MAX_WORDS = 500
 """Length of the longest name or reason that is written [characters]."""
 LOCK_TIME = 10.0
@@ -94,8 +96,10 @@ def _table(path: Path, columns: Sequence[str], count: int) -> list[tuple[int, di
     if missing := [name for name in columns if name not in named]:
         raise BadConfig(f"{path} lacks the column {missing[0]}; its first line must be {','.join(columns)}")
     for place, row in rows:
-        if not (row["episode"].isdecimal() and row["episode"].isascii() and int(row["episode"][:9]) < count):
+        digits = row["episode"].strip().lstrip("0") or row["episode"].strip()[:1]
+        if not (digits.isdecimal() and digits.isascii() and len(digits) <= MAX_DIGITS and int(digits) < count):
             raise BadConfig(f"{path}, line {place}: episode = {cut(row['episode'])!r}; it must be 0 to {count - 1}")
+        row["episode"] = digits
     return rows
 
 

@@ -71,6 +71,8 @@ class Whole:
         split = {"train": f"0:{counts['total_episodes']}"}
         made = {**counts, "splits": split, "data_path": DATA_PATH, "fps": FULL_RATE / self.periods}
         made["video_path"] = VIDEO_PATH if self.recording.cameras else None
+        if lacking := [name for name in self.columns if name not in info["features"]]:
+            yield _finding("INFO", f"meta/info.json lacks the columns {', '.join(lacking)[:100]}")
         for name, here in made.items():
             if info.get(name) != here:
                 yield _finding("INFO", f"meta/info.json: {name} is {str(info.get(name))[:40]}, not {here}")
@@ -117,7 +119,7 @@ class Whole:
         """Files with claims that the rows do not decide."""
         pictures = ["statistics of pictures", "meta/cameras"] if self.recording.cameras else []
         native = ["native/"] if (self.recording.folder / "native").is_dir() else []
-        return [*pictures, *native, "meta/scengen.json"]
+        return [*self.recording.texts, *pictures, *native, "meta/scengen.json"]
 
 
 def alike(told: Any, made: Mapping[str, Any]) -> bool:
