@@ -165,7 +165,7 @@ class Recording:
         rows = self._table(path).to_pylist()
         found = {row["task_index"]: row["task"] for row in rows if is_instruction(row)}
         if len(found) != len(rows):
-            raise PoolError(f"{path}: every line must have a task, and a task_index of its own; record it again")
+            raise PoolError(f"{path}: every line must have a task, and a separate task_index; record it again")
         return found
 
     @cached_property
