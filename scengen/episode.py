@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from .control.loop import Loop
 from .errors import UnknownName, Unstable
+from .means import Watch
 from .scenario import Scenario, Strict
 from .sim.world import World
 
@@ -56,6 +57,9 @@ class Episode:
         """Reason why the episode is not a success; empty while the outcome is open, and for a success."""
         self.held = 0.0
         """Time for which the goal has held without interruption [s]."""
+        self.lacks: tuple[str, ...] = ()
+        """Means of the task that a success lacks; empty for a success by the means, and as long as there is none."""
+        self._means = Watch(scenario.means(), world)
         self._eventful = type(scenario).events is not Scenario.events
 
     def step(self, action: NDArray[np.float32]) -> Outcome | None:
@@ -80,13 +84,15 @@ class Episode:
 
     def judge(self) -> Outcome | None:
         """Judge the past control period: failure takes precedence over success, success over the time limit."""
+        if self.outcome is None:
+            self._means.update()
         if self.outcome in (None, "success") and (lost := self._failure()):
             self.reason = f"after the goal was reached: {lost}" if self.outcome else lost
             self.outcome = "failure"
         elif self.outcome is None:
             self.held = self.held + Loop.PERIOD if self.scenario.success(self.world) else 0.0
             if self.held and self.held >= self.scenario.HOLD - 1e-9:
-                self.outcome = "success"
+                self.outcome, self.lacks = "success", self._means.lacking()
             elif self.world.time > self.horizon - 1e-9:
                 self.outcome, self.reason = "timeout", f"the goal was not reached in {self.horizon:g} s"
         return self.outcome

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .assets.prop import TABLE_HALF
 from .decisions import Decision
 from .errors import NoOracle
+from .means import Mean
 from .orientation import UPRIGHT, Orientation
 from .params import canonical, check_bounds
 from .robots.panda import BASE, REACH, SHOULDER
@@ -123,7 +124,7 @@ class Scenario(abc.ABC):
     Families with much in common may share one abstract base, which derives from `Scenario` directly. Such a base
     declares every field that it uses, so that it can be read without its families.
 
-    A family file reads: fields, scene (`build`), goal (`success`, `failure`, `events`), `oracle`, `steps`,
+    A family file reads: fields, scene (`build`), goal (`success`, `failure`, `means`, `events`), `oracle`, `steps`,
     `shortcuts`, `ablations`, `decisions`, `constraints`, `features`, `facts`, geometry.
     """
 
@@ -167,6 +168,14 @@ class Scenario(abc.ABC):
         Reasons of rules that the source of the task lacks are `Strict`. They come last, so that they hide no others.
         """
         return None
+
+    def means(self) -> Mapping[str, Mean]:
+        """What the intended solution does, by a name that completes "the goal was reached, but not: ...".
+
+        A success that lacks one of them is a success otherwise. Facts measure contacts, holds, rests, orders and
+        heights rather than places of the hand, which can be imitated. See `scengen.means`.
+        """
+        return {}
 
     def events(self, world: World) -> None:  # noqa: B027
         """Let the scene's own events happen. Called before every control period. It draws nothing: all values are

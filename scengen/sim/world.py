@@ -23,6 +23,10 @@ from .memory import Memory
 from .style import Style
 
 
+MAX_MEANS = 12
+"""Largest number of means of a task."""
+
+
 def _revived(kind: "type[World]", model: mujoco.MjModel, scripted: int, state: NDArray[np.float64]) -> "World":
     """A world of a compiled scene in a state."""
     world = kind.of(model, scripted)
@@ -51,6 +55,8 @@ class World:
     memory: Memory = field(init=False)
     """Numbers that record the episode's history, by the names that the scene declares with `remember`; all 0 at the
     start."""
+    shown: NDArray[np.float64] = field(init=False)
+    """What has been found out about the means of the task, shape (`MAX_MEANS`,); see `scengen.means`."""
     style: Style | None = field(default=None, init=False)
     """Style of the moves in this episode; None for those of certificates. A reset removes it."""
     _happening: bool = field(default=False, init=False)
@@ -60,7 +66,7 @@ class World:
         self.arms, self.partners = every[: len(every) - self.scripted], every[len(every) - self.scripted :]
         this = weakref.proxy(self)
         self.memory = Memory(self.model, self.data, lambda: this.check_event("writing to the memory"))
-        self.filter = Filter(len(self.arms))
+        self.filter, self.shown = Filter(len(self.arms)), np.zeros(MAX_MEANS)
 
     @classmethod
     def load(cls, scene_xml: str, embodiment: str = JAW, visual: bool = False, substeps: int | None = None) -> Self:
@@ -97,6 +103,7 @@ class World:
         """Return to the start. A used world then behaves bit by bit like a fresh one."""
         self.loop.reset()
         self.filter.reset()
+        self.shown[:] = 0.0
         self.style = None
         for arm in (*self.arms, *self.partners):
             arm.grip, arm.scripted_action = (1.0 if self.loop.holds and arm.number == 0 else -1.0), IDLE
@@ -323,11 +330,12 @@ class World:
 
     def state(self) -> NDArray[np.float64]:
         """Everything that the future depends on, as one vector."""
-        return np.concatenate([self.loop.state(), self.filter.state, [arm.grip for arm in self.arms]])
+        return np.concatenate([self.loop.state(), self.filter.state, self.shown, [arm.grip for arm in self.arms]])
 
     def restore(self, state: NDArray[np.float64]) -> None:
         """Continue bit by bit from the `state()` of a world of the same scene."""
-        loop, motion, grips = np.split(state, [-len(self.filter.state) - len(self.arms), -len(self.arms)])
+        arms, shown = len(self.arms), len(self.arms) + MAX_MEANS
+        loop, motion, self.shown[:], grips = np.split(state, [-len(self.filter.state) - shown, -shown, -arms])
         self.loop.restore(loop)
         self.filter.state = motion
         for arm, grip in zip(self.arms, grips, strict=True):

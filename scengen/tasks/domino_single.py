@@ -16,6 +16,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -24,6 +25,7 @@ from ..assets.box import Domino
 from ..assets.prop import TABLE_TOP, place, table
 from ..decisions import Decision, choice, near
 from ..geometry import UP, Vec3, heading, spoken
+from ..means import Mean, once, throughout
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS
@@ -82,6 +84,16 @@ class DominoSingle(Scenario):
         if carried(world, "tile_0", self.spot(0), CARRY_TOLERANCE):
             return Strict("the robot carried the first tile away")
         return None
+
+    def means(self) -> Mapping[str, Mean]:
+        pairs = [*pairwise(f"tile_{i}" for i in range(self.count)), (f"tile_{self.count - 1}", "slab")]
+        return {
+            "the robot touched the first tile alone": throughout(lambda world: not touched_only(world, "tile_0")),
+            "the first tile fell where it stood": throughout(
+                lambda world: not carried(world, "tile_0", self.spot(0), CARRY_TOLERANCE)
+            ),
+            "each tile struck the next": once(lambda world: all(world.touched(*pair) for pair in pairs)),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -44,6 +44,7 @@ from ..compat import set_damping
 from ..control.loop import Loop
 from ..decisions import Decision, choice, near, side_of, span
 from ..geometry import UP, Mat3, Vec3, between, corners, heading, polar, spoken
+from ..means import Mean, when
 from ..params import param
 from ..predicates import still
 from ..robots import jaw
@@ -72,6 +73,9 @@ MAX_BREAK = 0.2  # time for which pads may lose a bob that bounces between them 
 HAND_TILT = 65.0
 """Angle of the hand below the horizontal [deg]. At 30 it would look along the bob's path, but below 60 it drifts away
 by a centimetre, as joint 6 comes near its end; above 70 the palm meets the rod."""
+MEETING_ROOM = 0.012
+"""Largest gap beyond the bob's diameter at which a closing jaw meets it [m]. One finger that waits beside the path
+meets it with a wide jaw."""
 NEAR_SIDE = -1  # side of the turning point that is nearer to the robot
 
 
@@ -155,6 +159,20 @@ class PendulumGrasp(Scenario):
         """Whether a jaw starts to touch the bob that was not wide open just before. A rule of ours."""
         starts = world.touching(ROBOT, BOB) and world.time - world.memory["touch"] > MAX_BREAK
         return starts and world.time - world.memory["wide"] > self.closing_time
+
+    def means(self) -> Mapping[str, Mean]:
+        def meets(world: World) -> bool:
+            return world.touching(ROBOT, BOB)
+
+        return {
+            "the jaw was closing when the bob came": when(
+                meets, lambda world: world.arm.gap <= 2 * self.pendulum.radius + MEETING_ROOM
+            ),
+            "the jaw closed from wide open": when(
+                meets, lambda world: world.time - world.memory["wide"] <= self.closing_time
+            ),
+            "the jaw met the bob at its turning point": when(meets, self.at_apex),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

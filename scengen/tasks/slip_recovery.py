@@ -44,6 +44,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
 from ..decisions import Decision, choice, near, span
 from ..geometry import UP, Vec3, heading, way_to
+from ..means import Mean, throughout
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
@@ -138,6 +139,18 @@ class SlipRecovery(Scenario):
         if fallen(world, "thing"):
             return "the thing fell off the table"
         return Strict("the hand kept the thing through a slip") if world.memory["kept"] else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "the thing fell out of the hand": throughout(lambda world: not world.memory["kept"]),
+            "the thing fell clear of the fingers": throughout(lambda world: not self.caught(world)),
+        }
+
+    def caught(self, world: World) -> bool:
+        """Whether an object that slips comes to stand on the table between the fingers."""
+        lands = self.pending(world) and world.touching("thing", "table")
+        spans = ((world.arm.hand @ axis, *extent(world, "thing", axis)) for axis in world.rot("thing").T)
+        return lands and all(low <= at <= high for at, low, high in spans)
 
     def events(self, world: World) -> None:
         """Track where the object is carried and pushed, and open the jaw at the place of a slip."""

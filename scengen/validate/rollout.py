@@ -45,6 +45,8 @@ class Rollout:
     """Hash of the final physics state."""
     gave_up: str = ""
     """Reason why the plan could not be completed; empty if it was, or if the episode ended before."""
+    lacks: tuple[str, ...] = ()
+    """Means of the task that a success lacks."""
 
     @property
     def solved(self) -> bool:
@@ -52,8 +54,9 @@ class Rollout:
 
     def _repr_html_(self) -> str:
         """Its result, in a notebook."""
-        head = ("outcome", "reason", "time [s]", "actions", "the plan gave up", "final state")
-        row = (self.outcome, self.reason, self.seconds, len(self.actions), self.gave_up, self.digest)
+        head = ("outcome", "reason", "lacks", "time [s]", "actions", "the plan gave up", "final state")
+        lacks = ", ".join(self.lacks)
+        row = (self.outcome, self.reason, lacks, self.seconds, len(self.actions), self.gave_up, self.digest)
         return html_tables.table("Rollout", head, [row])
 
 
@@ -262,7 +265,7 @@ def _play(
 
     def ended(outcome: Outcome, reason: str, at: float) -> Rollout:
         played = np.array(actions, np.float32).reshape(-1, world.size)
-        return Rollout(outcome, reason, round(at, 6), played, world.digest, source.note)
+        return Rollout(outcome, reason, round(at, 6), played, world.digest, source.note, episode.lacks)
 
     while step() is None:
         if stillness and source.ended and not episode.held and stillness.lasts():

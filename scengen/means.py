@@ -1,0 +1,79 @@
+"""The means of a task: what its intended solution does, as named facts that are measured in every episode.
+
+Means are positive. Instead of ending an episode that goes another way, they say of a success whether the intended
+solution led to it. What they have found is part of a world's state: it is saved, restored and replayed with it.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from .sim.world import World
+
+Condition = Callable[[World], bool]
+"""Question about the past control period and the present state."""
+OPEN, SHOWN, MISSED = 0.0, 1.0, -1.0
+"""What is known of a mean: nothing yet, that it was there, or that its time passed without it."""
+
+
+@dataclass(frozen=True)
+class Mean:
+    """One fact. At the goal it must be shown, or still open if `lasting`."""
+
+    judge: Callable[[World], float]
+    """Function that decides in every control period while the mean is open: `OPEN`, `SHOWN` or `MISSED`."""
+    lasting: bool = False
+    """Whether the fact must hold all the time, so that an open mean counts at the goal."""
+    after: str = ""
+    """Name of another mean that must have been shown before this one is judged; empty if there is none."""
+
+
+def once(holds: Condition, after: str = "") -> Mean:
+    """A fact that is shown when it is true for the first time.
+
+    Args:
+        after: name of the mean that must have been shown before.
+    """
+    return Mean(lambda world: SHOWN if holds(world) else OPEN, after=after)
+
+
+def when(moment: Condition, holds: Condition, after: str = "") -> Mean:
+    """A fact that must be true at a moment, which is the first period in which `moment` is.
+
+    Args:
+        after: name of the mean that must have been shown before; the moment is looked for from then on.
+    """
+    return Mean(lambda world: (SHOWN if holds(world) else MISSED) if moment(world) else OPEN, after=after)
+
+
+def throughout(holds: Condition, after: str = "") -> Mean:
+    """A fact that must be true in every period up to the goal.
+
+    Args:
+        after: name of a mean; the fact must be true from the period on in which that was shown.
+    """
+    return Mean(lambda world: OPEN if holds(world) else MISSED, lasting=True, after=after)
+
+
+class Watch:
+    """What an episode has shown of the means of its task."""
+
+    def __init__(self, means: Mapping[str, Mean], world: World):
+        self.means, self.world = means, world
+        self._numbers = {name: number for number, name in enumerate(means)}
+
+    def update(self) -> None:
+        """Judge the past control period."""
+        shown = self.world.shown
+        for name, mean in self.means.items():
+            number = self._numbers[name]
+            if shown[number] == OPEN and (not mean.after or shown[self._numbers[mean.after]] == SHOWN):
+                shown[number] = mean.judge(self.world)
+
+    def lacking(self) -> tuple[str, ...]:
+        """Names of the means that an episode that ends now lacks."""
+        return tuple(name for name, mean in self.means.items() if not self._has(name, mean))
+
+    def _has(self, name: str, mean: Mean) -> bool:
+        found = self.world.shown[self._numbers[name]]
+        ready = not mean.after or self.world.shown[self._numbers[mean.after]] == SHOWN
+        return bool(found == SHOWN or (mean.lasting and ready and found == OPEN))
