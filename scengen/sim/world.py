@@ -22,7 +22,6 @@ from .embodiment import JAW, all_hands, compose, hands
 from .memory import Memory
 from .style import Style
 
-
 MAX_MEANS = 12
 """Largest number of means of a task."""
 
