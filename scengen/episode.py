@@ -57,8 +57,9 @@ class Episode:
         """Reason why the episode is not a success; empty while the outcome is open, and for a success."""
         self.held = 0.0
         """Time for which the goal has held without interruption [s]."""
-        self.lacks: tuple[str, ...] = ()
-        """Means of the task that a success lacks; empty for a success by the means, and as long as there is none."""
+        self.lacks = ""
+        """Means of the task that a success lacks, joined by semicolons; empty for a success by the means, and as long
+        as there is none."""
         self._means = Watch(scenario.means(), world)
         self._eventful = type(scenario).events is not Scenario.events
 

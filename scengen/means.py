@@ -7,7 +7,7 @@ solution led to it. What they have found is part of a world's state: it is saved
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from .sim.world import World
+from .sim.world import MAX_MEANS, World
 
 Condition = Callable[[World], bool]
 """Question about the past control period and the present state."""
@@ -58,6 +58,12 @@ class Watch:
     """What an episode has shown of the means of its task."""
 
     def __init__(self, means: Mapping[str, Mean], world: World):
+        """
+        Raises:
+            ValueError: there are more than `world.MAX_MEANS`.
+        """
+        if len(means) > MAX_MEANS:
+            raise ValueError(f"a task has at most {MAX_MEANS} means, not {len(means)}")
         self.means, self.world = means, world
         self._numbers = {name: number for number, name in enumerate(means)}
 
@@ -69,9 +75,9 @@ class Watch:
             if shown[number] == OPEN and (not mean.after or shown[self._numbers[mean.after]] == SHOWN):
                 shown[number] = mean.judge(self.world)
 
-    def lacking(self) -> tuple[str, ...]:
-        """Names of the means that an episode that ends now lacks."""
-        return tuple(name for name, mean in self.means.items() if not self._has(name, mean))
+    def lacking(self) -> str:
+        """Names of the means that a success now lacks, joined by semicolons; empty for a success by the means."""
+        return "; ".join(name for name, mean in self.means.items() if not self._has(name, mean))
 
     def _has(self, name: str, mean: Mean) -> bool:
         found = self.world.shown[self._numbers[name]]

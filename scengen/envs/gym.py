@@ -57,7 +57,7 @@ RENDER_MODES = ("rgb_array",)
 """Names of the render modes."""
 RESET_OPTIONS = ("scenario", "labels")
 """Names of the options of `reset`."""
-INFOS = ("success", "is_success", "reason", "time")
+INFOS = ("success", "is_success", "reason", "lacks", "time")
 """Entries of `info` without labels."""
 MAX_ACTION_REPEAT = 100
 """Largest `action_repeat` [control periods]: one second. Longer repeats leave the arm without effective control."""
@@ -116,7 +116,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     Reward: 1 when the goal is reached, else 0. `terminated` on success and on failure, `truncated` at the time limit.
     With `settle` a reached goal counts as in a certificate: it must still hold after the robot has been idle for one
     second, which is simulated within the last step.
-    `info` holds `success`, `is_success`, `time` [s], and at the end `reason`: nothing that identifies a scenario. After
+    `info` holds `success`, `is_success`, `time` [s], and at the end `reason` and `lacks`, the means of the task that
+    a success lacks: nothing that identifies a scenario. After
     `reset(options={"labels": True})` it also holds `scenario`, `scene_sha256`, `split` and `axes`, for evaluators.
 
     Threads may share an environment. Their calls run one after the other.
@@ -336,7 +337,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         made = {"next": self._next, "random": self._np_random, "random_seed": self._np_random_seed}
         if self._world is None:
             return made
-        episode = (self._episode.outcome, self._episode.reason, self._episode.held)
+        episode = (self._episode.outcome, self._episode.reason, self._episode.held, self._episode.lacks)
         entry = {"scenario": self._row.id, "world": self._world.state(), "episode": episode}
         return {**made, **entry, "played": [*self._played]}
 
@@ -346,7 +347,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._load(self._rows[self._rows.find(progress["scenario"])])
             self.world.restore(progress["world"])
             self._played = [*progress["played"]]
-            self._episode.outcome, self._episode.reason, self._episode.held = progress["episode"]
+            episode = self._episode
+            episode.outcome, episode.reason, episode.held, episode.lacks = progress["episode"]
         self._next = progress["next"]
         self._np_random, self._np_random_seed = progress["random"], progress["random_seed"]
 
@@ -415,7 +417,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._scenario.orientation.apply(self._renderer.take(camera)).copy()
 
     def _info(self, reason: str, success: bool) -> dict[str, Any]:
-        return {"success": success, "is_success": success, "reason": reason, "time": self.world.time}
+        lacks = self._episode.lacks if success else ""
+        return {"success": success, "is_success": success, "reason": reason, "lacks": lacks, "time": self.world.time}
 
     def _labels(self) -> dict[str, Any]:
         """Labels of the running scenario. A policy that sees them can memorise scenarios."""

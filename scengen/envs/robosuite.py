@@ -59,7 +59,8 @@ class RobosuiteEnv(ManipulationEnv):
     """The scenarios of one task as a robosuite environment; `env_class` makes a class for each task.
 
     `reward` is 1 once the goal has been reached, else 0. `done` is true at the horizon only, as in all environments of
-    robosuite. `info` holds `scenario`, `success`, and `reason`, the reason of a failure.
+    robosuite. `info` holds `scenario`, `success`, `reason`, the reason of a failure, and `lacks`, the means of the
+    task that a success lacks.
     Goal, failures and events of the scene follow the certificate's clock of 100 Hz with any `control_freq`. The
     certificate itself holds for 100 Hz and robosuite's default controller.
 
@@ -313,7 +314,8 @@ class RobosuiteEnv(ManipulationEnv):
     def _post_action(self, action: NDArray[np.float64]) -> tuple[float, bool, dict[str, Any]]:
         reward, done, info = super()._post_action(action)
         success = self._check_success()
-        return reward, done, {**info, "scenario": self.row.id, "success": success, "reason": self.episode.reason}
+        found = {"success": success, "reason": self.episode.reason, "lacks": self.episode.lacks if success else ""}
+        return reward, done, {**info, "scenario": self.row.id, **found}
 
     # --- choice of the scenario -----------------------------------------------------------
 

@@ -93,7 +93,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         self._infos: dict[str, NDArray[Any]] = {
             **{f"_{name}": np.ones(self.num_envs, np.bool_) for name in INFOS},
             **{name: np.zeros(self.num_envs, np.bool_) for name in ("success", "is_success")},
-            "reason": np.full(self.num_envs, "", object),
+            **{name: np.full(self.num_envs, "", object) for name in ("reason", "lacks")},
             "time": np.zeros(self.num_envs),
         }
         """The infos of slots whose episodes go on, but for the time, which each step writes."""

@@ -9,8 +9,10 @@ from typing import Any
 from .edition import Edition
 from .rollouts import Evaluation
 from .settings import EvaluateSettings
-from .table import TableLine, cells, plain, table
+from .table import TableLine, cells, otherwise, plain, table
 
+COUNTS = ("crashed", "otherwise")
+"""Counts of the lines of a table, each shown if any is above 0."""
 MAX_SHOWN = 20
 """Largest number of reasons in a printed list."""
 
@@ -29,6 +31,22 @@ class Failure:
     """Reason of the failure, or what crashed."""
     phase: str
     """Phase at the end of the episodes (`player.PHASES`); empty for episodes of older versions."""
+    episodes: int
+    """Number of episodes."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """Episodes of one policy that were solved and lack the same means."""
+
+    policy: str
+    """Name of the policy."""
+    task: str
+    """Name of the task."""
+    split: str
+    """Name of the split."""
+    lacks: str
+    """Means of the task that they lack, joined by semicolons."""
     episodes: int
     """Number of episodes."""
 
@@ -62,6 +80,19 @@ class PolicyResult:
         )
         return [Failure(self.settings.name, *about, count) for about, count in found.most_common()]
 
+    @cached_property
+    def ways(self) -> list[Way]:
+        """Its successes that lack means of their tasks, the most frequent first."""
+        found = Counter((e["task"], e["split"], e["lacks"]) for e in self.evaluation.episodes if otherwise(e))
+        return [Way(self.settings.name, *about, count) for about, count in found.most_common()]
+
+    @property
+    def by_means(self) -> str:
+        """How many solved episodes were solved by the means of their tasks; empty if all were."""
+        solved, ways = sum(e["success"] for e in self.evaluation.episodes), sum(way.episodes for way in self.ways)
+        said = f"{self.settings.name}: {solved} episodes solved, {solved - ways} of them by the means of the task"
+        return said if ways else ""
+
     @property
     def headline(self) -> str:
         """The drop of all tasks together; empty without two sides."""
@@ -89,6 +120,7 @@ class PolicyResult:
             "headline": self.headline,
             "table": plain(self.lines),
             "failures": [asdict(failure) for failure in self.failures],
+            "otherwise": [asdict(way) for way in self.ways],
         }
 
 
@@ -102,8 +134,8 @@ class Comparison:
     @property
     def head(self) -> list[str]:
         """Titles of the columns."""
-        crashed = ["crashed"] if self._crashed else []
-        return ["", "split", *self._if_several("policy"), "ID", "OOD", "difference", *crashed]
+        counts = [name for name in COUNTS if self._any(name)]
+        return ["", "split", *self._if_several("policy"), "ID", "OOD", "difference", *counts]
 
     def rows(self) -> Iterator[list[str]]:
         """The cells of the table: for each task and split, and each category, a row for each policy."""
@@ -114,8 +146,8 @@ class Comparison:
             for result, lines in zip(self.results, tables, strict=True):
                 if key in lines:
                     what, split, *rates = cells(lines[key])
-                    crashed = [str(lines[key].crashed)] if self._crashed else []
-                    yield [what, split, *self._if_several(result.settings.name), *rates, *crashed]
+                    counts = [str(getattr(lines[key], name)) for name in COUNTS if self._any(name)]
+                    yield [what, split, *self._if_several(result.settings.name), *rates, *counts]
 
     @property
     def failure_head(self) -> list[str]:
@@ -129,9 +161,19 @@ class Comparison:
             yield [*self._if_several(f.policy), f.task, f.split, f.reason, f.phase, str(f.episodes)]
 
     @property
+    def way_head(self) -> list[str]:
+        """Titles of the columns of the ways that lack means."""
+        return [*self._if_several("policy"), "task", "split", "solved otherwise, lacks", "episodes"]
+
+    def way_rows(self) -> Iterator[list[str]]:
+        """The cells of the successes of all policies that lack means, the most frequent first."""
+        for w in sorted((way for result in self.results for way in result.ways), key=lambda way: -way.episodes):
+            yield [*self._if_several(w.policy), w.task, w.split, w.lacks, str(w.episodes)]
+
+    @property
     def headlines(self) -> list[str]:
-        """The drop of each policy that has both sides."""
-        return [result.headline for result in self.results if result.headline]
+        """The drop of each policy that has both sides, and how many of its successes were by the means."""
+        return [line for result in self.results for line in (result.headline, result.by_means) if line]
 
     @property
     def plain(self) -> Mapping[str, Any]:
@@ -156,6 +198,8 @@ class Comparison:
         parts = [head, _table(self.head, self.rows())]
         if self.headlines:
             parts.append("\n".join(f"* {_escaped(line)}" for line in self.headlines))
+        if rows := list(self.way_rows()):
+            parts.append(_table(self.way_head, rows))
         if rows := list(self.failure_rows()):
             parts.append(_table(self.failure_head, rows))
         versions = {task: version for result in self.results for task, version in result.task_versions.items()}
@@ -166,9 +210,9 @@ class Comparison:
         """A cell of a column that only a comparison of several policies has."""
         return [cell] if len(self.results) > 1 else []
 
-    @property
-    def _crashed(self) -> bool:
-        return any(result.lines[-1].crashed for result in self.results)
+    def _any(self, name: str) -> bool:
+        """Whether a count of the table is above 0 in any result."""
+        return any(getattr(result.lines[-1], name) for result in self.results)
 
 
 def edition_told(name: str) -> dict[str, str]:

@@ -99,7 +99,7 @@ class PolicyPlayer:
             seen, _, terminated, truncated, infos = envs.step(actions)
             for slot, rollout in going.items():
                 if not rollout.record and (terminated[slot] or truncated[slot]):
-                    rollout.end(bool(infos["success"][slot]), infos["reason"][slot])
+                    rollout.end(bool(infos["success"][slot]), infos["reason"][slot], lacks=infos["lacks"][slot])
                     if self.settings.keep:
                         rollout.record["played"] = rollout.env.played
 

@@ -24,6 +24,8 @@ class TableLine:
     """Difference OOD minus ID; None if a rate is missing."""
     crashed: int = 0
     """Number of episodes in which the policy crashed. They are in no rate."""
+    otherwise: int = 0
+    """Number of episodes that were solved without all means of their task. Rates count them as solved."""
 
 
 def table(episodes: Sequence[Mapping[str, Any]]) -> list[TableLine]:
@@ -49,8 +51,16 @@ def table(episodes: Sequence[Mapping[str, Any]]) -> list[TableLine]:
     for category in dict.fromkeys(name for name, _ in whole):
         lines.append(_mean_line(category, [line for name, line in whole if name == category]))
     found = [*lines, _mean_line("all", [line for _, line in whole])]
-    crashed = [e for e in episodes if e.get("crashed")]
-    return [replace(line, crashed=sum(_belongs(e, line) for e in crashed)) for line in found]
+    counted = {"crashed": [e for e in episodes if e.get("crashed")], "otherwise": [e for e in episodes if otherwise(e)]}
+    return [
+        replace(line, **{name: sum(_belongs(e, line) for e in some) for name, some in counted.items()})
+        for line in found
+    ]
+
+
+def otherwise(episode: Mapping[str, Any]) -> bool:
+    """Whether an episode was solved, but not by the means of its task. Episodes of earlier releases do not say it."""
+    return bool(episode["success"] and episode.get("lacks"))
 
 
 def _belongs(episode: Mapping[str, Any], line: TableLine) -> bool:

@@ -45,8 +45,8 @@ class Rollout:
     """Hash of the final physics state."""
     gave_up: str = ""
     """Reason why the plan could not be completed; empty if it was, or if the episode ended before."""
-    lacks: tuple[str, ...] = ()
-    """Means of the task that a success lacks."""
+    lacks: str = ""
+    """Means of the task that a success lacks, joined by semicolons."""
 
     @property
     def solved(self) -> bool:
@@ -55,8 +55,7 @@ class Rollout:
     def _repr_html_(self) -> str:
         """Its result, in a notebook."""
         head = ("outcome", "reason", "lacks", "time [s]", "actions", "the plan gave up", "final state")
-        lacks = ", ".join(self.lacks)
-        row = (self.outcome, self.reason, lacks, self.seconds, len(self.actions), self.gave_up, self.digest)
+        row = (self.outcome, self.reason, self.lacks, self.seconds, len(self.actions), self.gave_up, self.digest)
         return html_tables.table("Rollout", head, [row])
 
 

@@ -85,13 +85,17 @@ def _show(compared: Comparison, settings: EvaluateSettings) -> None:
     for row in compared.rows():
         shown.add_row(*row)
     out.print(shown)
-    if every := list(compared.failure_rows()):
-        why = Table(*compared.failure_head, title="failures", title_justify="left")
-        for row in every[:MAX_SHOWN]:
-            why.add_row(*row)
-        out.print(why)
-        if (more := len(every) - MAX_SHOWN) > 0:
-            say(f"{more} more reasons are in table.md")
+    for title, head, rows in (
+        ("solved otherwise than by the means of the task", compared.way_head, [*compared.way_rows()]),
+        ("failures", compared.failure_head, [*compared.failure_rows()]),
+    ):
+        if rows:
+            why = Table(*head, title=title, title_justify="left")
+            for row in rows[:MAX_SHOWN]:
+                why.add_row(*row)
+            out.print(why)
+        if (more := len(rows) - MAX_SHOWN) > 0:
+            say(f"{more} more lines are in table.md")
     for line in compared.headlines:
         say(line)
 
