@@ -15,10 +15,13 @@ from .sim.world import World
 Outcome = Literal["success", "failure", "timeout", "unstable"]
 """Result of an episode."""
 Rules = Literal["strict", "paper"]
-"""Rules of an episode: all of them, or without those that the paper lacks (`scenario.Strict`)."""
+"""Rules of an episode: `strict`, under which a goal must be reached by the means of the task, or those of the paper.
+Rules that the paper lacks (`scenario.Strict`) belong to the former."""
 STRICT: Rules = "strict"
 PAPER: Rules = "paper"
 RULES: tuple[Rules, ...] = (STRICT, PAPER)
+OTHERWISE = "the goal was reached otherwise, it lacks"
+"""Beginning of the reason why a reached goal does not count. The missing means follow."""
 Actions = NDArray[np.float32]
 """Actions of an episode, shape (n, 7 * arms): one row per control period, exactly as the controller received it."""
 
@@ -58,8 +61,8 @@ class Episode:
         self.held = 0.0
         """Time for which the goal has held without interruption [s]."""
         self.lacks = ""
-        """Means of the task that a success lacks, joined by semicolons; empty for a success by the means, and as long
-        as there is none."""
+        """Means of the task that were lacking when the goal was reached, joined by semicolons; empty if none was, and
+        as long as the goal has not been reached."""
         self._means = Watch(scenario.means(), world)
         self._eventful = type(scenario).events is not Scenario.events
 
@@ -93,10 +96,18 @@ class Episode:
         elif self.outcome is None:
             self.held = self.held + Loop.PERIOD if self.scenario.success(self.world) else 0.0
             if self.held and self.held >= self.scenario.HOLD - 1e-9:
-                self.outcome, self.lacks = "success", self._means.lacking()
+                self._reach()
             elif self.world.time > self.horizon - 1e-9:
                 self.outcome, self.reason = "timeout", f"the goal was not reached in {self.horizon:g} s"
         return self.outcome
+
+    def _reach(self) -> None:
+        """Judge a goal that has been reached: unless the rules are the paper's, it must be reached by the means."""
+        self.lacks = self._means.lacking()
+        if self.lacks and self.rules == STRICT:
+            self.outcome, self.reason = "failure", f"{OTHERWISE}: {self.lacks}"
+        else:
+            self.outcome = "success"
 
     def _failure(self) -> str | None:
         lost = self.scenario.failure(self.world)

@@ -116,8 +116,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     Reward: 1 when the goal is reached, else 0. `terminated` on success and on failure, `truncated` at the time limit.
     With `settle` a reached goal counts as in a certificate: it must still hold after the robot has been idle for one
     second, which is simulated within the last step.
-    `info` holds `success`, `is_success`, `time` [s], and at the end `reason` and `lacks`, the means of the task that
-    a success lacks: nothing that identifies a scenario. After
+    `info` holds `success`, `is_success`, `time` [s], and at the end `reason` and `lacks`, the means of the task
+    without which the goal was reached: nothing that identifies a scenario. After
     `reset(options={"labels": True})` it also holds `scenario`, `scene_sha256`, `split` and `axes`, for evaluators.
 
     Threads may share an environment. Their calls run one after the other.
@@ -417,8 +417,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._scenario.orientation.apply(self._renderer.take(camera)).copy()
 
     def _info(self, reason: str, success: bool) -> dict[str, Any]:
-        lacks = self._episode.lacks if success else ""
-        return {"success": success, "is_success": success, "reason": reason, "lacks": lacks, "time": self.world.time}
+        found = {"success": success, "is_success": success, "reason": reason, "lacks": self._episode.lacks}
+        return {**found, "time": self.world.time}
 
     def _labels(self) -> dict[str, Any]:
         """Labels of the running scenario. A policy that sees them can memorise scenarios."""

@@ -60,7 +60,7 @@ class RobosuiteEnv(ManipulationEnv):
 
     `reward` is 1 once the goal has been reached, else 0. `done` is true at the horizon only, as in all environments of
     robosuite. `info` holds `scenario`, `success`, `reason`, the reason of a failure, and `lacks`, the means of the
-    task that a success lacks.
+    task without which the goal was reached.
     Goal, failures and events of the scene follow the certificate's clock of 100 Hz with any `control_freq`. The
     certificate itself holds for 100 Hz and robosuite's default controller.
 
@@ -314,7 +314,7 @@ class RobosuiteEnv(ManipulationEnv):
     def _post_action(self, action: NDArray[np.float64]) -> tuple[float, bool, dict[str, Any]]:
         reward, done, info = super()._post_action(action)
         success = self._check_success()
-        found = {"success": success, "reason": self.episode.reason, "lacks": self.episode.lacks if success else ""}
+        found = {"success": success, "reason": self.episode.reason, "lacks": self.episode.lacks}
         return reward, done, {**info, "scenario": self.row.id, **found}
 
     # --- choice of the scenario -----------------------------------------------------------

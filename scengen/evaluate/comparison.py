@@ -37,7 +37,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Way:
-    """Episodes of one policy that were solved and lack the same means."""
+    """Episodes of one policy that reached the goal without the same means."""
 
     policy: str
     """Name of the policy."""
@@ -82,16 +82,17 @@ class PolicyResult:
 
     @cached_property
     def ways(self) -> list[Way]:
-        """Its successes that lack means of their tasks, the most frequent first."""
+        """Its episodes that reached the goal without all means of their tasks, the most frequent first."""
         found = Counter((e["task"], e["split"], e["lacks"]) for e in self.evaluation.episodes if otherwise(e))
         return [Way(self.settings.name, *about, count) for about, count in found.most_common()]
 
     @property
     def by_means(self) -> str:
-        """How many solved episodes were solved by the means of their tasks; empty if all were."""
-        solved, ways = sum(e["success"] for e in self.evaluation.episodes), sum(way.episodes for way in self.ways)
-        said = f"{self.settings.name}: {solved} episodes solved, {solved - ways} of them by the means of the task"
-        return said if ways else ""
+        """How many episodes reached the goal by the means of their tasks; empty if all did."""
+        reached = [e for e in self.evaluation.episodes if e["success"] or otherwise(e)]
+        ways, every = sum(map(otherwise, reached)), len(self.evaluation.episodes)
+        said = f"the goal was reached in {len(reached)} of {every} episodes, in {len(reached) - ways} by the means"
+        return f"{self.settings.name}: {said}" if ways else ""
 
     @property
     def headline(self) -> str:
@@ -162,11 +163,11 @@ class Comparison:
 
     @property
     def way_head(self) -> list[str]:
-        """Titles of the columns of the ways that lack means."""
-        return [*self._if_several("policy"), "task", "split", "solved otherwise, lacks", "episodes"]
+        """Titles of the columns of other ways to the goal."""
+        return [*self._if_several("policy"), "task", "split", "lacks", "episodes"]
 
     def way_rows(self) -> Iterator[list[str]]:
-        """The cells of the successes of all policies that lack means, the most frequent first."""
+        """The cells of the other ways of all policies to the goal, the most frequent first."""
         for w in sorted((way for result in self.results for way in result.ways), key=lambda way: -way.episodes):
             yield [*self._if_several(w.policy), w.task, w.split, w.lacks, str(w.episodes)]
 

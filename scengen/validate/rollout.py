@@ -46,7 +46,7 @@ class Rollout:
     gave_up: str = ""
     """Reason why the plan could not be completed; empty if it was, or if the episode ended before."""
     lacks: str = ""
-    """Means of the task that a success lacks, joined by semicolons."""
+    """Means of the task that were lacking when the goal was reached, joined by semicolons."""
 
     @property
     def solved(self) -> bool:

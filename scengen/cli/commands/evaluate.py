@@ -86,7 +86,7 @@ def _show(compared: Comparison, settings: EvaluateSettings) -> None:
         shown.add_row(*row)
     out.print(shown)
     for title, head, rows in (
-        ("solved otherwise than by the means of the task", compared.way_head, [*compared.way_rows()]),
+        ("goal reached otherwise than by the means of the task", compared.way_head, [*compared.way_rows()]),
         ("failures", compared.failure_head, [*compared.failure_rows()]),
     ):
         if rows:
