@@ -222,7 +222,8 @@ class Session:
         del self._actions[moment.periods :]
         self.world.restore(moment.state)
         self._grips = moment.grips
-        self.episode.outcome, self.episode.reason, self.episode.held = None, "", moment.held
+        self.episode.outcome, self.episode.reason, self.episode.lacks = None, "", ""
+        self.episode.held = moment.held
         self.undone += 1
         self.phase, self.message = READY, f"back at {self.world.time:.2f} s"
 
