@@ -7,6 +7,7 @@ solution led to it. What they have found is part of a world's state: it is saved
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from .errors import UnknownName
 from .sim.world import MAX_MEANS, World
 
 Condition = Callable[[World], bool]
@@ -25,6 +26,13 @@ class Mean:
     """Whether the fact must hold all the time, so that an open mean counts at the goal."""
     after: str = ""
     """Name of another mean that must have been shown before this one is judged; empty if there is none."""
+
+    def found(self, world: World) -> float:
+        """What is found out about an open mean now. In a scene without a body that it is about, it is missed."""
+        try:
+            return self.judge(world)
+        except UnknownName:
+            return MISSED
 
 
 def once(holds: Condition, after: str = "") -> Mean:
@@ -73,7 +81,7 @@ class Watch:
         for name, mean in self.means.items():
             number = self._numbers[name]
             if shown[number] == OPEN and (not mean.after or shown[self._numbers[mean.after]] == SHOWN):
-                shown[number] = mean.judge(self.world)
+                shown[number] = mean.found(self.world)
 
     def lacking(self) -> str:
         """Names of the means that a success now lacks, joined by semicolons; empty for a success by the means."""

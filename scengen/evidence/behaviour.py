@@ -135,6 +135,7 @@ def declared(task: Task) -> dict[str, Any]:
         "disturbed": list(family.DISTURBED),
         "symmetries": sorted(map(repr, family.SYMMETRIES)),
         "certify": json.dumps(task.certify, sort_keys=True),
+        "means": [[mean.lasting, mean.after] for mean in task.nominal.means().values()],
         "steps": sorted(task.nominal.steps()),
         "shortcuts": {name: shortcut.to_rest for name, shortcut in task.nominal.shortcuts().items()},
     }

@@ -2,22 +2,28 @@
 
 import hashlib
 import json
+from collections.abc import Mapping
 from functools import cache
 from itertools import product
 from types import SimpleNamespace
 from typing import Any, cast
 
 import mujoco
+import numpy as np
 
 from ..control.loop import Loop
 from ..episode import RULES, Episode, Rules
+from ..means import Mean, throughout
 from ..scenario import Scenario, Strict
-from ..sim.world import World
+from ..sim.world import MAX_MEANS, World
 
-Answer = tuple[bool, str | None]
-"""Whether the goal holds, and the reason of a failure or None, in a control period."""
+Answer = tuple[bool, str | None, bool]
+"""Whether the goal holds, the reason of a failure or None, and whether the means are kept, in a control period."""
 
-ANSWERS: tuple[Answer, ...] = ((False, None), (True, None), (False, "lost"), (True, "lost"), (True, Strict("lost")))
+ANSWERS: tuple[Answer, ...] = (
+    *((goal, None, kept) for goal in (False, True) for kept in (False, True)),
+    *((False, "lost", True), (True, "lost", True), (True, Strict("lost"), True)),
+)
 """Answers of which episodes are made."""
 PERIODS = 5
 """Number of control periods of an episode; the time limit is one less."""
@@ -29,7 +35,7 @@ class Scripted(Scenario):
     HOLD = 2 * Loop.PERIOD
 
     def __init__(self) -> None:
-        self.now: Answer = ANSWERS[0]
+        self.now: Answer = ANSWERS[1]
 
     def build(self) -> mujoco.MjSpec:
         """Never called: there is no scene."""
@@ -41,6 +47,9 @@ class Scripted(Scenario):
     def failure(self, world: World) -> str | None:
         return self.now[1]
 
+    def means(self) -> Mapping[str, Mean]:
+        return {"kept": throughout(lambda world: self.now[2])}
+
 
 @cache
 def episodes_sha256() -> str:
@@ -51,7 +60,7 @@ def episodes_sha256() -> str:
 
 def _outcome(answers: tuple[Answer, ...], rules: Rules) -> list[Any]:
     """Outcome and reason after each period, and after the time for which a reached goal has to last."""
-    scenario, clock = Scripted(), SimpleNamespace(time=0.0)
+    scenario, clock = Scripted(), SimpleNamespace(time=0.0, shown=np.zeros(MAX_MEANS))
     episode = Episode(scenario, cast(World, clock), (PERIODS - 1) * Loop.PERIOD, rules)
     found: list[Any] = []
     for scenario.now in answers:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..control.loop import ACTION, Loop
 from ..control.teleop import MOTION
 from ..episode import Actions
+from ..means import OPEN, SHOWN
 from ..pool.manifest import without_numbers
 from ..samplers.keyed import normals
 from ..scenario import Plan, Planner, Scenario
@@ -91,13 +92,18 @@ class Trace:
 
 def answer_of(scenario: Scenario, world: World) -> str:
     """Answers of the rules in a state: the reason of a failure, whether the goal holds, whether an event is pending,
-    and the memory. Numbers of the memory that are not whole are left out, because they change in every period."""
+    which means are shown (+) or missed (-), by number, and the memory.
+
+    Numbers of the memory that are not whole are left out, because they change in every period.
+    """
     lost = scenario.failure(world)
     parts = [without_numbers(lost) if lost else "goal" if scenario.success(world) else "open"]
     if lost is not None:
         parts.append(type(lost).__name__)
     if scenario.pending(world):
         parts.append("pending")
+    judged = enumerate(mean.found(world) for mean in scenario.means().values())
+    parts += [f"{'+' if found == SHOWN else '-'}{number}" for number, found in judged if found != OPEN]
     memory = world.memory
     parts += [f"{name} {whole(memory[name])}" for name in memory.names if memory[name]]
     return ", ".join(parts)

@@ -29,7 +29,7 @@ from ..means import Mean, once, throughout
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS
-from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import come_beside, grasp, pick, poke, step_back
@@ -49,7 +49,7 @@ SLAB_DISPLACEMENT = 0.05
 class DominoSingle(Scenario):
     """A straight chain of tiles with a red slab at its end; the first tile, the starter, may differ from the others."""
 
-    VERSION = 1
+    VERSION = 2
 
     count: int = param(5, "tiles", 2, 15)  # number of tiles; the slab does not count
     gap_ratio: float = param(0.9, "tile widths", 0.2, 2.5)  # free space between neighbouring faces
@@ -79,10 +79,6 @@ class DominoSingle(Scenario):
     def failure(self, world: World) -> str | None:
         if world.touched(ROBOT, "slab"):
             return "the robot touched the slab"
-        if touched_only(world, "tile_0"):
-            return Strict("the robot touched a tile other than the first")
-        if carried(world, "tile_0", self.spot(0), CARRY_TOLERANCE):
-            return Strict("the robot carried the first tile away")
         return None
 
     def means(self) -> Mapping[str, Mean]:
