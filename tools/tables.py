@@ -283,9 +283,10 @@ def paper() -> dict[str, str]:
 
 
 def ending(task: Task) -> str:
-    """What ends an episode of a task, as Markdown."""
-    reasons = failures(task.family)
-    lines = [
+    """The means of a task, and what ends an episode, as Markdown."""
+    reasons, means = failures(task.family), "; ".join(task.nominal.means())
+    lines = [f"Means: {means}.\n"] if means else []
+    lines += [
         f"{kind}: {'; '.join(of)}.\n"
         for kind, strict in {"Strict rules": True, "Other failures": False}.items()
         if (of := [text for text, is_strict in reasons if is_strict == strict])

@@ -73,8 +73,8 @@ class Attacks(_Searches):
 
 
 def has_strict_rules(task: Task) -> bool:
-    """Whether a task has a rule that the paper lacks."""
-    return any(strict for _, strict in failures(task.family))
+    """Whether a task has a rule that the paper lacks, or means."""
+    return bool(task.nominal.means()) or any(strict for _, strict in failures(task.family))
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ def page(task: Task, measured: Figures, films: Path | None = None) -> str:
             *_story(task),
             *_films(made),
             *_facts(task),
+            *_heading("Means", _means(task), "means"),
             *_heading("Sub-goals and questions", understanding(task), "agents"),
             *_heading("Parameters", parameters(task)),
             *_axes(task, made, measured),
@@ -66,6 +67,13 @@ def _story(task: Task) -> Iterator[str]:
     yield from (f"# {task.name}", "", f"**{title.rstrip('.')}.**", "", rest.strip("\n"), "")
     yield from (f"![Witness of a training scenario in {FRAMES} pictures]({task.name}.jpg)", "")
     yield from ("*A solution of a training scenario, from the upper left to the lower right.*", "")
+
+
+def _means(task: Task) -> Iterator[str]:
+    """What the intended solution does, and without which a goal does not count under strict rules."""
+    means = task.nominal.means()
+    yield "A goal counts under strict rules if all of these are true:" if means else "The family states none."
+    yield from ("", *(f"* {name}" for name in means), "")
 
 
 def _films(made: Exhibit | None) -> Iterator[str]:
