@@ -48,6 +48,7 @@ from ..assets.prop import TABLE_TOP, place, servo, table
 from ..assets.slot_board import PLATE_THICKNESS, STIFFNESS, SlotBoard
 from ..decisions import Decision, around, choice, near, side_of
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap, heading, polar, way_to
+from ..means import Mean, throughout
 from ..params import param
 from ..predicates import fallen
 from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW
@@ -67,6 +68,7 @@ TURN_MARGIN = math.radians(3.0)  # angle by which the turn exceeds the steepest 
 INSERTED_SHARE = 0.95  # share of the peg's length beyond the mouth to which the oracle pushes (paper)
 MIN_INSERTED_SHARE = 0.93  # least such share that counts
 MAX_INSERTED_SHARE = 1.03  # largest such share that counts: a flush peg
+MEETING_TOLERANCE = 0.002  # distance beyond its play in the slot by which a nose is out of line [m]
 GRIP_HEIGHT = 0.024
 """Height above the foot at which the peg is grasped [m]: the level hand's palm is 32 mm below, the table 54 mm."""
 BOARD_CLEARANCE = 0.006  # clearance of the fingers from the board when they release the peg [m]
@@ -119,6 +121,16 @@ class RecoverPegInsert(Scenario):
 
     def failure(self, world: World) -> str | None:
         return "the peg fell off the table" if fallen(world, "peg") else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {"after the turn the peg met the board in its mouth": throughout(lambda world: not self.tried(world))}
+
+    def tried(self, world: World) -> bool:
+        """Whether the board has turned, and the peg touches it with its nose before the mouth and out of line."""
+        nose = max(self.ends(world), key=lambda end: end[0])
+        aside = float(np.abs(nose[1:]).max()) > (self.board.slot - self.peg.width) / 2 + MEETING_TOLERANCE
+        outside = nose[0] < PLATE_THICKNESS / 2
+        return bool(world.memory["turned"] and world.touching("peg", "board") and outside and aside)
 
     def events(self, world: World) -> None:
         """Turn the board once, as soon as the peg is in line."""

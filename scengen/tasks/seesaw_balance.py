@@ -42,6 +42,7 @@ from ..assets.seesaw import Seesaw, standing
 from ..decisions import Decision, around, choice, near
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, compound, heading, quat, spoken
+from ..means import Mean, once, throughout
 from ..params import param, with_values
 from ..predicates import fallen
 from ..robots.jaw import PALM_ALONG
@@ -122,6 +123,18 @@ class SeesawBalance(Scenario):
         if any(world.touched(other, "target") for other in others):
             return Strict("the target was touched")
         return Strict("the target fell on the table") if world.touched("target", "table") else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "the target was left alone on the deck": throughout(lambda world: not self.moved(world)),
+            "the hand put the counterweight on the deck": once(
+                lambda world: world.touching(ROBOT, "weight") and world.touching("weight", BEAM)
+            ),
+        }
+
+    def moved(self, world: World) -> bool:
+        """Whether something other than the deck has touched the target."""
+        return any(world.touched(other, "target") for other in (ROBOT, "table", *{*world.free_bodies} - {"target"}))
 
     def along(self, world: World, block: str) -> float:
         """Place of a block along the deck, from the axle [m]."""

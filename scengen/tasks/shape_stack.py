@@ -35,6 +35,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.shape import CONE_SLOPE, CYLINDER, FRUSTUM, HEXAGON, TRIANGLE, Shape
 from ..decisions import Decision, choice
 from ..geometry import UP, Vec3, about_z
+from ..means import Mean, once, throughout
 from ..params import Bounded, param
 from ..predicates import fallen, still
 from ..robots.jaw import OPEN_GAP, PAD_BELOW, PALM_ABOVE, PALM_ALONG, TIP_BELOW
@@ -131,8 +132,20 @@ class ShapeStack(Scenario):
             return "a shape fell off the table"
         if self.cone_tried(world):
             return Strict("a shape was set on the cone")
-        toppled = (n for n in self.pieces if world.tilt(n) > FALL_ANGLE and not world.touching(ROBOT, n))
-        return Strict("a shape toppled") if next(toppled, None) else None
+        return Strict("a shape toppled") if self.toppled(world) else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "nothing was set on the cone": throughout(lambda world: not self.cone_tried(world)),
+            "each shape stood where it was put": throughout(lambda world: not self.toppled(world)),
+            "each shape but the lowest was carried": once(
+                lambda world: sum(world.touched(ROBOT, name) for name in self.pieces) >= len(self.pieces) - 1
+            ),
+        }
+
+    def toppled(self, world: World) -> bool:
+        """Whether a shape leans that the robot does not hold."""
+        return any(world.tilt(n) > FALL_ANGLE and not world.touching(ROBOT, n) for n in self.pieces)
 
     def cone_tried(self, world: World) -> bool:
         """Whether another shape is on the cone, held or not: it touches the cone with its foot above the collar."""

@@ -49,8 +49,9 @@ from ..assets.rack import STOREYS, TierRack
 from ..assets.ycb import Ycb
 from ..decisions import Decision, around, choice, near, side_of
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
+from ..means import Mean, once, throughout
 from ..params import param
-from ..predicates import fallen, rests_on, still
+from ..predicates import fallen, held, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..robots.panda import BASE, ROBOTVIEW
 from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
@@ -137,9 +138,17 @@ class ShelteredGrasp(Scenario):
     def failure(self, world: World) -> str | None:
         if fallen(world, "thing"):
             return "the thing fell off the table"
-        if self._sheltered(world) and world.touching(ROBOT, "thing") and self._beside(world) > MAX_BESIDE:
-            return Strict("the thing was felt for in the rack")
-        return None
+        return Strict("the thing was felt for in the rack") if self.felt(world) else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "the thing was not felt for in the rack": throughout(lambda world: not self.felt(world)),
+            "the jaw carried the thing": once(lambda world: held(world, "thing")),
+        }
+
+    def felt(self, world: World) -> bool:
+        """Whether the robot touches the object in the rack where a jaw does not grasp it."""
+        return self._sheltered(world) and world.touching(ROBOT, "thing") and self._beside(world) > MAX_BESIDE
 
     def _sheltered(self, world: World) -> bool:
         """Whether the object's middle is in the rack."""

@@ -42,6 +42,7 @@ from ..assets.incline import Incline, Load, LoadedIncline, driven
 from ..assets.prop import TABLE_TOP, place, table
 from ..decisions import Decision, around, choice, near
 from ..geometry import UP, Vec3, about_z, yaw_of
+from ..means import Mean, throughout, when
 from ..params import param
 from ..predicates import fallen, still
 from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
@@ -130,6 +131,30 @@ class SlideCatch(Scenario):
         if self.turned(world):
             return Strict("the bin was turned while the ramp tilted")
         return Strict("the bin tipped over") if world.tilt("bin") > math.radians(20.0) else None
+
+    def means(self) -> Mapping[str, Mean]:
+        waits = {
+            f"the bin was below block {lane} before it slid": when(
+                lambda world, lane=lane: self.slid(world, lane) > VISIBLE_SLIDE,
+                lambda world, lane=lane: abs(world.pos("bin")[1] - self.ramp.spot(lane)[1]) < self.bin.length / 2,
+            )
+            for lane in range(BLOCK_COUNT)
+        }
+        return waits | {
+            "each block slid over the lip by itself": throughout(lambda world: not self.helped(world)),
+            "the bin stood upright and square to the lip": throughout(
+                lambda world: not self.turned(world) and world.tilt("bin") <= math.radians(20.0)
+            ),
+        }
+
+    def slid(self, world: World, lane: int) -> float:
+        """Distance that a block has slid down the ramp [m]."""
+        return self.loads[lane].away - self.distance_up(world, self.blocks[lane])
+
+    def helped(self, world: World) -> bool:
+        """Whether the robot touches the ramp or a block, or the bin touches a block on the ramp."""
+        low = any(world.touching("bin", b) and self.ramp.under(world.com(b)) for b in self.blocks)
+        return low or any(world.touching(ROBOT, each) for each in ("incline/slab", *self.blocks))
 
     def turned(self, world: World) -> bool:
         """Whether the ramp has started to tilt, and the bin is not square to the lip."""

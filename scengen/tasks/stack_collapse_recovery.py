@@ -32,6 +32,7 @@ oracle places it within 3 mm. Each finger has 12 mm of clearance beside a cube.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations, pairwise
 
 import mujoco
@@ -42,9 +43,10 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..control.loop import Loop
 from ..decisions import Decision, choice, near, side_of
 from ..geometry import UP, Vec3, heading
+from ..means import Mean, once
 from ..params import Bounded, param
 from ..physics import stopping_speed, thrown_off
-from ..predicates import count_time, fallen, still
+from ..predicates import count_time, fallen, held, still
 from ..robots.jaw import PALM_ABOVE, PALM_ALONG, SPAN, TIP_BELOW
 from ..robots.panda import BASE
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
@@ -124,6 +126,14 @@ class StackCollapseRecovery(Scenario):
 
     def failure(self, world: World) -> str | None:
         return "a cube fell off the table" if fallen(world, *NAMES) else None
+
+    def means(self) -> Mapping[str, Mean]:
+        fell, last = ["top", "middle"][: 1 + self.planned[-1].both], self.blows
+
+        def carried(name: str, world: World) -> bool:
+            return world.memory["blows"] == last and bool(world.memory["fell"]) and held(world, name)
+
+        return {f"the fallen {name} cube was carried in the jaw": once(partial(carried, name)) for name in fell}
 
     def events(self, world: World) -> None:
         """Strike once the tower has stood for its time; notice when its top cube lies on the table."""

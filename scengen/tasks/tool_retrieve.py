@@ -34,6 +34,7 @@ from ..assets.hook import Hook, JHook, LHook, THook
 from ..assets.prop import TABLE_TOP, place, table
 from ..decisions import Decision, choice, near, side_of
 from ..geometry import UP, Vec3, about_y, about_z, corners, heading, polar, way_to
+from ..means import Mean, when
 from ..params import param
 from ..predicates import fallen, held
 from ..robots import ik
@@ -65,6 +66,7 @@ T_HOOK = 2  # number of the T hook
 MAX_DISTANCE = 0.72
 """Largest distance from the robot's first axis of a grasp from above at table height that plans use [m]; inverse
 kinematics allows 0.76."""
+MIN_DRAW = 0.05  # least distance by which the hook draws the cube towards the robot [m]
 PULL_END_DISTANCE = 0.60
 """Distance from the robot's first axis to which the cube is drawn, if the handle is short enough [m]."""
 
@@ -106,6 +108,19 @@ class ToolRetrieve(Scenario):
 
     def failure(self, world: World) -> str | None:
         return "the cube fell off the table" if fallen(world, "cube") else None
+
+    def means(self) -> Mapping[str, Mean]:
+        near = polar(self.spot - BASE)[1] - MIN_DRAW
+        return {
+            "the hook drew the cube nearer before a hand touched it": when(
+                lambda world: world.touching(ROBOT, "cube"),
+                lambda world: world.touched("hook", "cube") and polar(world.com("cube") - BASE)[1] < near,
+            ),
+            "the hook was put down before the cube was taken": when(
+                lambda world: world.touching(ROBOT, "cube") and not world.touching("cube", "table"),
+                lambda world: not world.touching(ROBOT, "hook"),
+            ),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 
