@@ -36,6 +36,7 @@ from ..assets.inlaid_rod import InlaidRod
 from ..assets.ridge import Ridge
 from ..decisions import Decision, around, choice, near, side_of
 from ..geometry import UP, Mat3, about_z, gap, way_to
+from ..means import Mean, throughout, when
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import count_time, fallen, rests_on
@@ -95,11 +96,29 @@ class UprightRod(RodAndRidge[InlaidRod]):
         if fallen(world, "rod"):
             return "the rod fell off the table"
         touched = world.touching(ROBOT, "rod")
-        if not world.touching_bodies("rod") and world.velocity("rod")[5] < -MAX_FALL_SPEED:
+        if self.dropped(world):
             return Strict("the rod was dropped")
         if not touched and world.tilt("rod") > MAX_TILT:
             return Strict("the rod was let go and tipped")
         return Strict("the rod was touched again on the ridge") if touched and self.released(world) else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "the hand set the rod on the ridge": when(
+                lambda world: world.touching("rod", RIDGE), lambda world: world.touching(ROBOT, "rod")
+            ),
+            "the rod was not dropped": throughout(lambda world: not self.dropped(world)),
+            "the rod stood by itself when it was let go": throughout(
+                lambda world: world.touching(ROBOT, "rod") or world.tilt("rod") <= MAX_TILT
+            ),
+            "the rod was left alone on the ridge": throughout(
+                lambda world: not (world.touching(ROBOT, "rod") and self.released(world))
+            ),
+        }
+
+    def dropped(self, world: World) -> bool:
+        """Whether the rod falls freely."""
+        return not world.touching_bodies("rod") and world.velocity("rod")[5] < -MAX_FALL_SPEED
 
     def released(self, world: World) -> bool:
         """Whether the rod has stood on the ridge without the robot."""

@@ -35,6 +35,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.zone import Zone
 from ..decisions import Decision, choice
 from ..geometry import UP, Outline, Vec3, corners, gap, least_gap
+from ..means import Mean, when
 from ..params import Bounded, param
 from ..predicates import fallen, held, rests_on, still
 from ..robots.jaw import OPEN_GAP, SPAN
@@ -131,6 +132,13 @@ class MassSort(Scenario):
             return "a cube fell off the table"
         early = any(zone is not None for zone in zones.values()) and not self.probed(world)
         return Strict("a cube was put into a zone before each had been lifted") if early else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "each cube was weighed in the hand before one was let go in a zone": when(
+                lambda world: any(self.zone_of(world, cube) is not None for cube in self.cubes), self.probed
+            )
+        }
 
     def events(self, world: World) -> None:
         """Notice which cubes have been lifted."""

@@ -42,10 +42,11 @@ from ..assets.bar import Bar
 from ..assets.prop import TABLE_TOP, place, table
 from ..decisions import Decision, choice, near, side_of
 from ..geometry import UP, Vec3, corners
+from ..means import Mean, when
 from ..orientation import UPRIGHT, VIEW_CENTRE, Orientation
 from ..params import param
 from ..physics import GRAVITY
-from ..predicates import fallen, held
+from ..predicates import displaced, fallen, held
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, TIP_BELOW, pinch
 from ..scenario import Action, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
@@ -57,6 +58,8 @@ LIFT_HEIGHT = 0.04
 MIN_PICTURE_OFFSET = 0.12
 """Least distance between the cube and where the picture shows it [m]: the open jaw reaches 66 mm to either side of the
 hand and half a diagonal of the cube is 42 mm, so that a hand that goes there does not even touch the cube."""
+MAX_SHIFT = 0.02
+"""Distance by which closing fingers may move the cube [m]; a palm that sweeps the table moves it farther."""
 APPROACH_HEIGHT = 0.10  # height above the grasp from which the hand comes down [m]
 VIEWS = (UPRIGHT, Orientation(2), Orientation(0, True), Orientation(2, True), Orientation(1))
 """Orientations by `view`: upright, turned by 180 deg, left and right exchanged, above and below exchanged, a quarter
@@ -96,6 +99,13 @@ class MirrorPickPlace(Scenario):
 
     def failure(self, world: World) -> str | None:
         return "the cube fell off the table" if fallen(world, "cube") else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "the jaw closed on the cube where it lay": when(
+                lambda world: held(world, "cube"), lambda world: displaced(world, "cube", self.spot) < MAX_SHIFT
+            )
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -40,8 +40,9 @@ from ..assets.patch import Patch
 from ..assets.prop import CAMERAS, TABLE_TOP, Rgba, place, table
 from ..decisions import Decision, choice, near
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap, least_gap
+from ..means import Mean, throughout, when
 from ..params import Bounded, param
-from ..predicates import fallen, over, rests_on, still
+from ..predicates import displaced, fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
@@ -124,11 +125,23 @@ class OccluderPush(Scenario):
         red = self.cubes[self.reddest(world)]
         if fallen(world, red):
             return "the red cube fell off the table"
-        for cube in self.cubes:
-            let_go = world.touching(cube, "table") and not world.touching(ROBOT, cube)
-            if cube != red and let_go and self.on_patch(world, cube):
-                return Strict("another cube was put on the patch")
-        return None
+        return Strict("another cube was put on the patch") if self.mistaken(world) else None
+
+    def means(self) -> Mapping[str, Mean]:
+        red = self.cubes[self.red]
+        lids = {f"lid_{self.red}_{k}" for k in range(self.lids)}
+        return {
+            "the red cube was uncovered before it was moved": when(
+                lambda world: world.touching(ROBOT, red) and displaced(world, red, self.foot(self.red)) > 0.01,
+                lambda world: not lids & world.touching_bodies(red),
+            ),
+            "no other cube was let go on the patch": throughout(lambda world: not self.mistaken(world)),
+        }
+
+    def mistaken(self, world: World) -> bool:
+        """Whether a cube that is not red lies on the patch without the robot."""
+        lying = (cube for cube in self.cubes if world.touching(cube, "table") and not world.touching(ROBOT, cube))
+        return any(self.on_patch(world, cube) for cube in lying if cube != self.cubes[self.reddest(world)])
 
     def reddest(self, world: World) -> int:
         """Index of the red cube, by its colour in the scene."""

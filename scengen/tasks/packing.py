@@ -47,6 +47,7 @@ from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..decisions import Decision, around, choice, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, corners, least_gap, way_to, yaw_of
+from ..means import Mean, once, throughout
 from ..params import Bounded, param
 from ..physics import GRAVITY
 from ..predicates import fallen, inside, off_first_pose, remember_first_pose
@@ -139,6 +140,16 @@ class Packing(Scenario):
             return "a piece fell off the table"
         moved = any(self._elsewhere(world, i) for i in range(self.count))
         return Strict("a piece was tried in a second place") if moved else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "each piece stayed where it first went in": throughout(
+                lambda world: not any(self._elsewhere(world, i) for i in range(self.count))
+            ),
+            "the cup brought each piece": once(
+                lambda world: all(world.touched(ROBOT, piece) for piece in world.free_bodies)
+            ),
+        }
 
     def _elsewhere(self, world: World, i: int) -> bool:
         """Whether piece `i` is in a different place than at its first touch in the bin."""

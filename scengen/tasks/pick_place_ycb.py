@@ -37,6 +37,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
 from ..decisions import Decision, choice, near
 from ..geometry import UP, Vec3, heading, way_to
+from ..means import Mean, once
 from ..params import param
 from ..predicates import fallen, held, over, rests_on, still
 from ..robots.panda import BASE
@@ -114,6 +115,13 @@ class PickPlaceYcb(Scenario):
 
     def failure(self, world: World) -> str | None:
         return "the thing fell off the table" if fallen(world, "thing") else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "the thing was in the hand when the square had come to rest": once(
+                lambda world: world.memory["jumps"] == self.jumps and held(world, "thing")
+            )
+        }
 
     def events(self, world: World) -> None:
         """Notice that the object is lifted, and let the square jump away from it."""

@@ -40,6 +40,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..decisions import Decision, choice, near, side_of, span
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
+from ..means import Mean, throughout
 from ..params import param
 from ..physics import GRAVITY
 from ..robots.jaw import FINGER_ACROSS, PALM_ACROSS, PALM_ALONG, TIP_BELOW
@@ -153,6 +154,17 @@ class RampSort(Scenario):
             if self.high_over_ramp(world, i):
                 return Strict("a ball was carried over the ramp or the bins")
         return None
+
+    def means(self) -> Mapping[str, Mean]:
+        balls = range(len(self.colours))
+        return {
+            "each ball rolled over the ramp into its bin": throughout(
+                lambda world: all(world.touched(f"ball_{i}", "ramp") for i in balls if self.arrived(world, i))
+            ),
+            "no ball was carried over the ramp or the bins": throughout(
+                lambda world: not any(self.high_over_ramp(world, i) for i in balls)
+            ),
+        }
 
     def arrived(self, world: World, i: int) -> int:
         """Side of the bin that a ball is in; 0 while it is in none."""

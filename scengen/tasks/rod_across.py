@@ -30,6 +30,7 @@ from ..assets.rod import SLUG_EDGE, Rod
 from ..decisions import Decision, around, choice, near, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, gap, shortest, way_to
+from ..means import Mean, once, throughout, when
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
@@ -78,6 +79,20 @@ class RodAcross(RodAndRidge[Rod]):
             return "the rod fell off the table"
         let_go = not world.touching(ROBOT, "rod")
         return Strict("the rod was let go and tipped") if let_go and world.tilt("rod") > MAX_TILT else None
+
+    def means(self) -> Mapping[str, Mean]:
+        on_ridge, opened = "the hand laid the rod on the ridge", "the jaw let the rod go there"
+        wide = self.rod.width + 0.002
+        return {
+            on_ridge: when(lambda world: world.touching("rod", RIDGE), lambda world: world.touching(ROBOT, "rod")),
+            opened: once(lambda world: world.touching("rod", RIDGE) and world.arm.gap > wide, after=on_ridge),
+            "the jaw did not close on the rod again": throughout(
+                lambda world: world.arm.gap > wide or not world.touching(ROBOT, "rod"), after=opened
+            ),
+            "the rod stayed level when it was let go": throughout(
+                lambda world: world.touching(ROBOT, "rod") or world.tilt("rod") <= MAX_TILT
+            ),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

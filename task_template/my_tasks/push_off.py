@@ -17,6 +17,7 @@ from scengen.assets.patch import Patch
 from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.decisions import Decision, around
 from scengen.geometry import UP, Vec3, heading
+from scengen.means import Mean, when
 from scengen.params import param
 from scengen.predicates import fallen, inside, still
 from scengen.robots.jaw import FINGER_ACROSS
@@ -78,6 +79,14 @@ class PushOff(Scenario):
         if self.moved(world) > self.distance + self.zone.size / 2:
             return "the cube has gone past the zone"
         return "the cube fell off the table" if fallen(world, "cube") else None
+
+    def means(self) -> Mapping[str, Mean]:
+        """What the intended solution does. A goal that was reached without it does not count under strict rules."""
+        return {
+            "the block pushed the cube": when(
+                lambda world: self.moved(world) > 0.01, lambda world: world.touched("block", "cube")
+            )
+        }
 
     def moved(self, world: World) -> float:
         """Distance that the cube has moved along the push [m]."""
