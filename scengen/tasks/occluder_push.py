@@ -44,7 +44,7 @@ from ..means import Mean, throughout, when
 from ..params import Bounded, param
 from ..predicates import displaced, fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import grasp, pick, poke, put, release
@@ -123,9 +123,7 @@ class OccluderPush(Scenario):
 
     def failure(self, world: World) -> str | None:
         red = self.cubes[self.reddest(world)]
-        if fallen(world, red):
-            return "the red cube fell off the table"
-        return Strict("another cube was put on the patch") if self.mistaken(world) else None
+        return "the red cube fell off the table" if fallen(world, red) else None
 
     def means(self) -> Mapping[str, Mean]:
         red = self.cubes[self.red]

@@ -44,12 +44,12 @@ from ..compat import set_damping
 from ..control.loop import Loop
 from ..decisions import Decision, choice, near, side_of, span
 from ..geometry import UP, Mat3, Vec3, between, corners, heading, polar, spoken
-from ..means import Mean, when
+from ..means import Mean, throughout, when
 from ..params import param
 from ..predicates import still
 from ..robots import jaw
 from ..robots.panda import BASE
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.memory import remember
 from ..sim.world import World
@@ -141,22 +141,17 @@ class PendulumGrasp(Scenario):
         inside = math.dist(world.com(BOB), world.arm.hand) < GRASP_TOLERANCE
         return inside and world.touching(ROBOT, BOB) and world.arm.gap < 2 * self.pendulum.radius
 
-    def failure(self, world: World) -> str | None:
-        if world.touching(ROBOT, BOB) and not self.at_apex(world):
-            return Strict("the robot touched the pendulum away from its turning point")
-        if world.arm.gap < MISS_SHARE * 2 * self.pendulum.radius or self.missed(world):
-            return Strict("the jaw closed on nothing")
-        return Strict("the jaw did not close from wide open") if self.narrow(world) else None
-
     def missed(self, world: World) -> bool:
-        """Whether a jaw that was wide open has started to close and has not touched the bob in time. A rule of ours."""
+        """Whether a jaw has closed on nothing, or did not touch the bob in time after it was wide open."""
         memory = world.memory
+        if world.arm.gap < MISS_SHARE * 2 * self.pendulum.radius:
+            return True
         met = memory["touch"] > memory["wide"] or world.touching(ROBOT, BOB)
         late = world.time - memory["wide"] > self.closing_time
         return bool(memory["reopened"]) or (memory["wide"] > 0.0 and late and not met)
 
     def narrow(self, world: World) -> bool:
-        """Whether a jaw starts to touch the bob that was not wide open just before. A rule of ours."""
+        """Whether a jaw starts to touch the bob that was not wide open just before."""
         starts = world.touching(ROBOT, BOB) and world.time - world.memory["touch"] > MAX_BREAK
         return starts and world.time - world.memory["wide"] > self.closing_time
 
@@ -168,10 +163,11 @@ class PendulumGrasp(Scenario):
             "the jaw was closing when the bob came": when(
                 meets, lambda world: world.arm.gap <= 2 * self.pendulum.radius + MEETING_ROOM
             ),
-            "the jaw closed from wide open": when(
-                meets, lambda world: world.time - world.memory["wide"] <= self.closing_time
+            "the jaw closed from wide open": throughout(lambda world: not self.narrow(world)),
+            "the jaw closed once, in time for the bob": throughout(lambda world: not self.missed(world)),
+            "the robot touched the bob at its turning point alone": throughout(
+                lambda world: self.at_apex(world) or not meets(world)
             ),
-            "the jaw met the bob at its turning point": when(meets, self.at_apex),
         }
 
     # --- oracle ---------------------------------------------------------------------------

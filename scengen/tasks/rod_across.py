@@ -36,7 +36,7 @@ from ..physics import GRAVITY
 from ..predicates import fallen, rests_on
 from ..robots.jaw import PAD, pinch
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Action, Answer, Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Action, Answer, Plan, Planner, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import let_go, pick, weigh
@@ -75,10 +75,7 @@ class RodAcross(RodAndRidge[Rod]):
         return bool(world.tilt("rod") <= MAX_TILT and crossing and rests_on(world, "rod", RIDGE))
 
     def failure(self, world: World) -> str | None:
-        if fallen(world, "rod"):
-            return "the rod fell off the table"
-        let_go = not world.touching(ROBOT, "rod")
-        return Strict("the rod was let go and tipped") if let_go and world.tilt("rod") > MAX_TILT else None
+        return "the rod fell off the table" if fallen(world, "rod") else None
 
     def means(self) -> Mapping[str, Mean]:
         on_ridge, opened = "the hand laid the rod on the ridge", "the jaw let the rod go there"

@@ -54,7 +54,7 @@ from ..params import param
 from ..predicates import fallen, held, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..robots.panda import BASE, ROBOTVIEW
-from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import grasp, let_go, pick
@@ -136,9 +136,7 @@ class ShelteredGrasp(Scenario):
         return between and rests_on(world, "thing", "tray") and still(world, "thing", 0.02)
 
     def failure(self, world: World) -> str | None:
-        if fallen(world, "thing"):
-            return "the thing fell off the table"
-        return Strict("the thing was felt for in the rack") if self.felt(world) else None
+        return "the thing fell off the table" if fallen(world, "thing") else None
 
     def means(self) -> Mapping[str, Mean]:
         return {

@@ -50,7 +50,7 @@ from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, TIP_BELOW
 from ..robots.panda import BASE
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.memory import remember
 from ..sim.world import World
@@ -136,9 +136,7 @@ class SlipRecovery(Scenario):
     def failure(self, world: World) -> str | None:
         if world.memory["slid"] > MAX_SLIDE:
             return "the robot slid the thing over the table"
-        if fallen(world, "thing"):
-            return "the thing fell off the table"
-        return Strict("the hand kept the thing through a slip") if world.memory["kept"] else None
+        return "the thing fell off the table" if fallen(world, "thing") else None
 
     def means(self) -> Mapping[str, Mean]:
         return {
