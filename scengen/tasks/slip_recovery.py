@@ -146,7 +146,7 @@ class SlipRecovery(Scenario):
 
     def caught(self, world: World) -> bool:
         """Whether an object that slips comes to stand on the table between the fingers."""
-        lands = self.pending(world) and world.touching("thing", "table")
+        lands = self.pending(world) and world.touching("thing", "table") and not world.memory["lost"]
         spans = ((world.arm.hand @ axis, *extent(world, "thing", axis)) for axis in world.rot("thing").T)
         return lands and all(low <= at <= high for at, low, high in spans)
 
