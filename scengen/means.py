@@ -12,8 +12,12 @@ from .sim.world import MAX_MEANS, World
 
 Condition = Callable[[World], bool]
 """Question about the past control period and the present state."""
-OPEN, SHOWN, MISSED = 0.0, 1.0, -1.0
-"""What is known of a mean: nothing yet, that it was there, or that its time passed without it."""
+OPEN = 0.0
+"""Nothing is known of a mean yet."""
+SHOWN = 1.0
+"""A mean was there."""
+MISSED = -1.0
+"""The time of a mean has passed without it."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Gymnasium environments over pools: `gymnasium.make("scengen/domino_single-v1", pool="generated/id")`.
+"""Gymnasium environments over pools: `gymnasium.make("scengen/domino_single-v2", pool="generated/id")`.
 
 Importing this module registers every task. `gymnasium.make("scengen.envs.gym:scengen/...")` imports it by itself. The
 number in an id is the version of the task (`Scenario.VERSION`). `-v0` names the installed version, too, with a warning.

@@ -1,4 +1,4 @@
-"""Many environments in one process: `gymnasium.make_vec("scengen/domino_single-v1", num_envs=16, pool="generated/id")`.
+"""Many environments in one process: `gymnasium.make_vec("scengen/domino_single-v2", num_envs=16, pool="generated/id")`.
 
 Every slot has its own simulation. Threads step the slots: the compiled control loop releases Python's lock.
 """

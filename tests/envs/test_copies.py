@@ -19,7 +19,7 @@ PUSH = np.full(7, 0.3, np.float32)
 
 @pytest.fixture
 def env():
-    made = gymnasium.make("scengen/domino_single-v1", pool=str(REFERENCE), action_filter="teleop")
+    made = gymnasium.make("scengen/domino_single-v2", pool=str(REFERENCE), action_filter="teleop")
     made.reset(seed=1)
     for _ in range(20):
         made.step(np.full(7, 0.2))
@@ -51,7 +51,7 @@ def test_a_copy_outlives_its_original(env):
 
 
 def test_an_environment_that_was_never_reset_is_copied_too():
-    made = copy.deepcopy(gymnasium.make("scengen/domino_single-v1", pool=str(REFERENCE)))
+    made = copy.deepcopy(gymnasium.make("scengen/domino_single-v2", pool=str(REFERENCE)))
     assert made.reset(seed=2, options={"labels": True})[1]["scenario"] == Pool.open(REFERENCE).at(2).id
 
 
@@ -73,7 +73,7 @@ def test_a_copy_under_lerobots_names_reads_its_own_environment(env, copied):
 
 
 def test_copies_of_vectors_of_environments_step_alone():
-    envs = gymnasium.make_vec("scengen/domino_single-v1", num_envs=2, vectorization_mode="sync", pool=str(REFERENCE))
+    envs = gymnasium.make_vec("scengen/domino_single-v2", num_envs=2, vectorization_mode="sync", pool=str(REFERENCE))
     envs.reset(seed=[0, 1])
     twins = copy.deepcopy(envs)
     twins.step(np.tile(PUSH, (2, 1)))

@@ -41,7 +41,7 @@ def test_what_was_not_asked_for_is_not_there():
 def test_lerobots_evaluation_finds_what_it_asks_an_environment_for():
     """A vector of environments; `call` for the time limit and the task; success under `is_success`."""
     envs = gymnasium.make_vec(
-        "scengen.envs.gym:scengen/domino_single-v1",
+        "scengen.envs.gym:scengen/domino_single-v2",
         num_envs=2,
         vectorization_mode="sync",
         wrappers=[LeRobotNames],

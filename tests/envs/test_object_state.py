@@ -172,7 +172,7 @@ def test_what_cannot_move_has_a_pose_and_no_velocity():
 
 def test_gymnasium_offers_it_whole_and_in_parts_with_names():
     seen = ["object-state", "slab_pos", "tile_5_quat"]
-    env = gymnasium.make("scengen.envs.gym:scengen/domino_single-v1", pool=REFERENCE, observations=seen)
+    env = gymnasium.make("scengen.envs.gym:scengen/domino_single-v2", pool=REFERENCE, observations=seen)
     check_env(env.unwrapped, skip_render_check=True)
     observation, _ = env.reset(seed=0)
     names = env.metadata["names"]

@@ -271,6 +271,9 @@ class Stub:
     def failure(self, world):
         return self.lost
 
+    def means(self):
+        return {}
+
     def events(self, world):
         self.begun += 1
 

@@ -117,7 +117,7 @@ def test_the_end_of_an_episode_is_in_the_infos_of_the_same_step():
 
 
 def test_infos_and_spaces_are_those_of_gymnasiums_own_vector_environment():
-    ours = gymnasium.make_vec("scengen/domino_single-v1", num_envs=2, pool=REFERENCE)
+    ours = gymnasium.make_vec("scengen/domino_single-v2", num_envs=2, pool=REFERENCE)
     theirs = SyncVectorEnv([lambda: PoolEnv("domino_single", REFERENCE)] * 2)
     assert isinstance(ours, PoolVectorEnv) and ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"]
     assert ours.observation_space == theirs.observation_space and ours.action_space == theirs.action_space
