@@ -29,6 +29,7 @@ from ..work.machine import memory_bounded
 from ..work.plain import open_plain
 from .lerobot import VIDEO_PATH
 from .schema import TEXT, check_episode, check_film, check_info, is_instruction
+from .streams import ENVIRONMENT
 
 TASK_VERSION = "scengen/task_version"
 """Column of the table of episodes with the version of the task. Recordings of earlier releases lack it."""
@@ -133,6 +134,12 @@ class Recording:
         return [name for name, feature in self.info["features"].items() if feature["dtype"] == "video"]
 
     @property
+    def entries(self) -> tuple[str, ...]:
+        """Names of the entries of the environment state; empty if it was not recorded."""
+        names = self.info["features"].get(ENVIRONMENT, {}).get("names")
+        return tuple(names) if isinstance(names, list) else ()
+
+    @property
     def picture_size(self) -> tuple[int, int]:
         """Width and height of the pictures [pixels]; 0 and 0 if there are none.
 
@@ -165,7 +172,7 @@ class Recording:
         rows = self._table(path).to_pylist()
         found = {row["task_index"]: row["task"] for row in rows if is_instruction(row)}
         if len(found) != len(rows):
-            raise PoolError(f"{path}: every line must have a task, and a task_index of its own; record it again")
+            raise PoolError(f"{path}: every line must have a task, and a separate task_index; record it again")
         return found
 
     @cached_property

@@ -270,6 +270,26 @@ def _swapped(plain: Any, of: str = "robot0_eef_pos") -> None:
     names[0], names[1] = names[1], names[0]
 
 
+def _unannounced(folder: Path) -> None:
+    _json("meta/info.json", lambda plain: plain["features"].pop("task_index"), folder)
+
+
+def _narrow(folder: Path) -> None:
+    """The rows of the hand's pose have two numbers, and meta/info.json says so."""
+
+    def told(plain: Any) -> None:
+        feature = plain["features"]["robot0_eef_pos"]
+        feature.update(shape=[2], names=feature["names"][:2])
+
+    table = pq.read_table(folder / ROWS)
+    place = table.schema.get_field_index("robot0_eef_pos")
+    values = [value[:2] for value in table["robot0_eef_pos"].to_pylist()]
+    pq.write_table(
+        table.set_column(place, "robot0_eef_pos", pa.array(values, pa.list_(pa.float32(), 2))), folder / ROWS
+    )
+    _json("meta/info.json", told, folder)
+
+
 def _twice_as_fast(folder: Path) -> None:
     _json("meta/info.json", lambda plain: plain.update(fps=50), folder)
     rows("timestamp", lambda values: values / 2)(folder)
@@ -308,6 +328,8 @@ RECORDINGS: dict[str, tuple[Callable[[Path], None], str]] = {
         partial(_json, "meta/info.json", partial(_swapped, of="observation.environment_state")),
         "INFO",
     ),
+    "column without a description": (_unannounced, "INFO"),
+    "two numbers for a place": (_narrow, "MISSING_FIELD"),
     "rate": (_twice_as_fast, "INFO"),
     "robot": (partial(_json, "meta/info.json", lambda p: p.update(robot_type="panda_suction")), "INFO|not a recording"),
     "paths": (partial(_json, "meta/info.json", lambda p: p.update(data_path="../{chunk_index}.parquet")), "INFO"),

@@ -29,6 +29,19 @@ def test_a_score_is_one_of_five_texts(tmp_path, score):
         scores_by_people(path, 1)
 
 
+@pytest.mark.parametrize("episode", ["2", "0000000009", "0" * 5000 + "7", "9" * 5000, "-1", "1.0", "\u0661", ""])
+def test_a_line_names_an_episode_that_exists(tmp_path, episode):
+    (tmp_path / "scores.csv").write_text(f"episode,score\n{episode},5\n")
+    with pytest.raises(BadConfig, match="it must be 0 to 1"):
+        scores_by_people(tmp_path / "scores.csv", 2)
+
+
+def test_zeros_before_a_number_are_no_other_episode(tmp_path):
+    (tmp_path / "scores.csv").write_text(f"episode,score\n{'0' * 5000}1,5\n1,4\n")
+    with pytest.raises(BadConfig, match="line 3: 4, an earlier line of this episode says 5"):
+        scores_by_people(tmp_path / "scores.csv", 2)
+
+
 def test_lines_that_contradict_each_other_are_refused(tmp_path):
     scores, decisions = tmp_path / "scores.csv", tmp_path / "decisions.csv"
     scores.write_text("episode,score\n0,5\n0,5\n")

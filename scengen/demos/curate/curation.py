@@ -25,7 +25,6 @@ from ...agents.models import made
 from ...errors import PoolError
 from ...export.dataset import CURATION, EpisodeData, Recording
 from ...export.recording import CONTROL_ACTIONS
-from ...export.streams import ENVIRONMENT
 from ...pool.files import read_json_file, replace_file, sha256
 from ...work.parallel import UNTRUSTED_LIMITS, Workers, each
 from ...work.targets import try_folder
@@ -128,7 +127,8 @@ def _examined(
         readable = not any(one.check in ("MISSING_FIELD", "NAN") for one in findings)
         terms.append(terms_of(episode, recording.fps) if readable else {})
         tasks.append(episode.task)
-        solved.append(readable and bool(episode.about["scengen/success"]) and bool(episode.columns["next.success"][-1]))
+        reached = episode.about["scengen/success"], episode.columns["next.success"][-1]
+        solved.append(readable and all(map(bool, reached)))
         if readable:
             findings += whole.of_episode(episode)
             films, told = _videos(episode, recording)
@@ -144,9 +144,10 @@ def _examined(
                 task = compose.load_task(episode.task, search)
                 if (robot := recording.info["robot_type"]) != task.embodiment:
                     findings.append(found("INFO", f"robot_type is {robot}, that of the task is {task.embodiment}"))
-                entries = recording.info["features"].get(ENVIRONMENT, {}).get("names") or ()
                 jobs.append(
-                    Recorded.of(episode.number, task, episode.about, episode.columns, entries, size, films, frozen)
+                    Recorded.of(
+                        episode.number, task, episode.about, episode.columns, recording.entries, size, films, frozen
+                    )
                 )
         else:
             whole.skip(episode)

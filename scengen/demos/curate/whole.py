@@ -106,8 +106,7 @@ class Whole:
         made: dict[str, Sequence[str] | None] = {n: feature_of(n, stream).names for n, stream in own.items()}
         made |= {"action": action_names(robot), CONTROL_ACTIONS: ("period", "action")}
         made[STATE] = named(own, proprioception(robot))
-        told = features.get(ENVIRONMENT, {}).get("names") or []
-        made[ENVIRONMENT] = state_of(told, robot).names
+        made[ENVIRONMENT] = state_of(self.recording.entries, robot).names
         for name, feature in features.items():
             kind = next((kind for kind in KINDS if name.endswith(f"_{kind}")), None)
             entries = made.get(name) or (kind and [f"{name}.{entry}" for entry in KINDS[kind]])
