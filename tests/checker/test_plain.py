@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from others import honest
 
+from scengen import cli
 from scengen.demos.curate.curation import CurateSettings, curate
 from scengen.demos.curate.people import decisions_of_people, scores_by_people
 from scengen.errors import BadConfig, PoolError, ScengenError
@@ -79,6 +80,16 @@ def test_a_list_of_kept_episodes_that_is_none_is_refused(mine):
     (mine / "curation" / "kept.json").write_text("[0, 7]")
     with pytest.raises(PoolError, match="there is no episode 7"):
         TrainingData.read(mine)
+
+
+def test_nothing_is_learned_from_episodes_that_people_have_rejected_since(mine, tmp_path, capsys):
+    (mine / "curation").mkdir()
+    (mine / "curation" / "decisions.csv").write_text("episode,verdict,who,why\n0,reject,op1,slips\n")
+    for kept in (None, "[0]"):
+        if kept:
+            (mine / "curation" / "kept.json").write_text(kept)
+        assert cli.run(["train", f"data={mine}", f"to={tmp_path / 'policy'}"]) == 2
+        assert "a verdict about episode 0 that curation/kept.json does not follow; repeat" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("writer", [replace_file, write])

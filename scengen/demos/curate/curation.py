@@ -31,7 +31,7 @@ from ...work.targets import try_folder
 from .checks import Subject, check_rows, found
 from .findings import REPORTS, SCHEMA, EpisodeReport, Finding, read_reports
 from .labels import CLAIMED
-from .people import DECISIONS, SCORES, Decision, decisions_of_people, scores_by_people
+from .people import ACCEPT, DECISIONS, REJECT, SCORES, Decision, decisions_of_people, scores_by_people
 from .remarks import with_remarks
 from .replays import Recorded, Replayed, comparison_of, lost, replayed
 from .score import KEPT_SCORE, scores_of, terms_of
@@ -213,8 +213,8 @@ def _decided(recording: Recording, reports: tuple[EpisodeReport, ...], decisions
     """Stage 3: a person's verdict decides; without one, episodes with a sufficient score and no flag are kept."""
     scored = [report for report in reports if report.score >= KEPT_SCORE]
     clean = [report.episode for report in scored if not report.flagged]
-    accepted = {k for k, decision in decisions.items() if decision.verdict == "accept"}
-    rejected = {k for k, decision in decisions.items() if decision.verdict == "reject"}
+    accepted = {k for k, decision in decisions.items() if decision.verdict == ACCEPT}
+    rejected = {k for k, decision in decisions.items() if decision.verdict == REJECT}
     kept = sorted({*clean, *accepted} - rejected)
     funnel = {"recorded": len(reports), "scored": len(scored), "without findings": len(clean), "kept": len(kept)}
     return Curated(recording, reports, decisions, tuple(kept), funnel)
