@@ -196,10 +196,16 @@ def test_bash_gets_what_comes_after_its_own_word_breaks(tmp_path):
 @pytest.mark.parametrize(
     ("argv", "says"),
     [
-        (("verify", "mujoco", "mujoco.x=1"), "mujoco.x: mujoco has no settings in it; give mujoco=..."),
+        (("verify", "mujoco", "mujoco.x=1"), "mujoco.x: mujoco has no settings in it; give mujoco=... alone"),
         (("new", "task=all", "package=p"), "task = all; give a word"),
         (("generate", "task=domino_single", "n=1", "~certify.robust"), "certify.robust cannot be deleted"),
         (("evaluate", "~client.x"), "client.x cannot be deleted"),
+        (("report", "~budget"), "no setting of report named 'budget'"),
+        (("report", "~n.n"), "no setting of report named 'n'"),
+        (("attack", "pool=x", "task.horizon=3"), "task.horizon: no task is chosen; give task=NAME, too"),
+        (("curate", "stats", "data=x", "executor=null"), "no setting of curate stats named 'executor'"),
+        (("generate", "task=domino_single", "executor=null"), "leave it out, or name a file of conf/executor"),
+        (("generate", "task=domino_single", f"seed={'9' * 5000}"), "a number of more than 4300 digits"),
         (("agent", "model=a=b"), "quote the value twice: 'model=\"a=b\"'"),
         (("show", "pool=x{y"), "quote the value twice: 'pool=\"x{y\"'"),
         (("generate", "task=domino_single", "task.horizon.x=3"), "task.horizon has no settings in it"),
