@@ -1,5 +1,6 @@
 """What people who know Hydra try: lists of values, --cfg and --info, completion, examples in every help."""
 
+import os
 import re
 import shlex
 import shutil
@@ -221,3 +222,16 @@ def test_values_and_deletions_that_hydra_takes_otherwise_have_a_remedy(argv, say
 def test_a_number_of_workers_is_limited_in_every_command(argv, capsys):
     assert cli.run((*argv, "workers=100000000")) == 2
     assert "workers = 100000000; it must be at most 256" in capsys.readouterr().err
+
+
+def test_pipes_and_endless_files_among_tasks_are_passed_over_or_refused(tmp_path, capsys):
+    tasks = tmp_path / "task"
+    tasks.mkdir()
+    os.mkfifo(tasks / "piped.yaml")
+    given = ("tasks", f"hydra.searchpath=[file://{tmp_path}]")
+    assert cli.run(given) == 0
+    with open(tasks / "endless.yaml", "wb") as file:
+        file.truncate(10**12)
+    capsys.readouterr()
+    assert cli.run(given) == 2
+    assert "endless.yaml has 1000000000000 bytes; a task file has at most" in capsys.readouterr().err
