@@ -94,7 +94,7 @@ def fields(subject: Subject) -> Iterator[Finding]:
         yield found(MISSING_FIELD, f"columns of meta/info.json are missing: {', '.join(missing)}")
     other = [name for name, shape in needed.items() if name in columns and not _has_shape(columns[name], shape)]
     if other:
-        yield found(MISSING_FIELD, f"columns have another shape than those of the robot: {', '.join(other)}")
+        yield found(MISSING_FIELD, f"columns do not have the shapes of the robot: {', '.join(other)}")
     if (length := subject.episode.about["length"]) != len(subject.episode):
         yield found("LENGTH_FIELD", "the table of episodes has another length", told=length, rows=len(subject.episode))
 

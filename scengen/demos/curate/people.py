@@ -18,7 +18,10 @@ SCORE_COLUMNS = ("episode", "score")
 DECISION_COLUMNS = ("episode", "verdict", "who", "why")
 SCORE_TEXTS = ("1", "2", "3", "4", "5")
 """Scores of people."""
-ACCEPT, REJECT = "accept", "reject"
+ACCEPT = "accept"
+"""Verdict that keeps an episode."""
+REJECT = "reject"
+"""Verdict that keeps an episode out."""
 VERDICTS = (ACCEPT, REJECT)
 """Verdicts of people."""
 MAX_CSV = 1_000_000
