@@ -146,7 +146,15 @@ def _examined(
                     findings.append(found("INFO", f"robot_type is {robot}, that of the task is {task.embodiment}"))
                 jobs.append(
                     Recorded.of(
-                        episode.number, task, episode.about, episode.columns, recording.entries, size, films, frozen
+                        episode.number,
+                        task,
+                        episode.about,
+                        episode.columns,
+                        recording.entries,
+                        size,
+                        films,
+                        recording.calibrations,
+                        frozen,
                     )
                 )
         else:

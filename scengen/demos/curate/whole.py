@@ -116,9 +116,9 @@ class Whole:
     @property
     def claimed(self) -> list[str]:
         """Files with claims that the rows do not decide."""
-        pictures = ["statistics of pictures", "meta/cameras"] if self.recording.cameras else []
+        pictures = ["statistics of pictures"] if self.recording.cameras else []
         native = ["native/"] if (self.recording.folder / "native").is_dir() else []
-        return [*self.recording.texts, *pictures, *native, "meta/scengen.json"]
+        return [*self.recording.texts, *pictures, *native, "meta/scengen.json", "README.md"]
 
 
 def alike(told: Any, made: Mapping[str, Any]) -> bool:
