@@ -41,6 +41,8 @@ def _made(kind: str) -> Path:
         _run("demos", "task=domino_single", "n=4", "runs=2", f"to={folder}")
     elif kind == "one":
         _run("demos", "task=domino_single", "n=1", f"to={folder}")
+    elif kind == "brief":  # a goal must last for a fifth of the usual time
+        _run("demos", "task=domino_single", "n=1", "certify.settle=0.2", f"to={folder}")
     elif kind == "failures":  # a short time limit, of which the task of the manifest tells
         _run("demos", "task=domino_single", "task.horizon=3.0", "n=2", "keep=failed", "limit=12", f"to={folder}")
     elif kind == "apart":
@@ -144,6 +146,16 @@ def task(**changed: Any) -> Forge:
     return change
 
 
+def version_of(package: str) -> Forge:
+    return lambda m, rows, failures: m["versions"].update({package: "9.9.9"})
+
+
+def driven(m: Manifest, rows: list[Any], failures: list[Any]) -> None:
+    """What an oracle has played is said to be driven by a person."""
+    m["operator"], m["styles"], m["config"]["styles"] = "op7", {"teleop": len(rows)}, ["teleop"]
+    rows[:] = [replace(row, style="teleop") for row in rows]
+
+
 def times(factor: int) -> Forge:
     def change(m: Manifest, rows: list[Any], failures: list[Any]) -> None:
         m["indices"] *= factor
@@ -206,6 +218,12 @@ DEMONSTRATIONS: dict[str, tuple[str, Forge, str]] = {
     "time limit": ("demonstrations", task(horizon=24.0), "│ horizon"),
     "category": ("demonstrations", task(category="dexterity"), "the category is|│ category"),
     "code": ("demonstrations", task(code="T99"), "the code is|│ code"),
+    "version of scengen": ("demonstrations", version_of("scengen"), "made with scengen 9.9.9, this is"),
+    "platform": ("demonstrations", version_of("platform"), "made with platform 9.9.9, this is"),
+    "code of the task": ("demonstrations", manifest(source_sha256=HASH), "made with different code of the task"),
+    "version of the task": ("demonstrations", manifest(task_version=9), "made on version 9"),
+    "teleoperation": ("demonstrations", driven, "claimed, and not checked: operator op7 drove the robot"),
+    "settling time": ("brief", manifest(), "│ settle"),
     "rules": ("demonstrations", config(rules="paper"), "│ rules"),
     "apart from nothing": ("demonstrations", config(apart=[HASH]), "claimed, and not checked: apart from 1 pools"),
     "policy": ("idle", manifest(policy="ours:v9"), "claimed, and not checked: policy 'ours:v9' drove the robot"),

@@ -72,7 +72,10 @@ KINDS = {
     ),
     "train": Kind(("train", "data={recording}", "epochs=40"), "to", ("policy.json", "weights.npz")),
     "evaluate": Kind(
-        ("evaluate", "policy=oracle", "pool={pool}", "rollouts=5"), "to", ("episodes.jsonl", "table.json"), workers=True
+        ("evaluate", "policy=oracle", "pool={pool}", "seeds=6", "rollouts=5"),
+        "to",
+        ("episodes.jsonl", "table.json"),
+        workers=True,
     ),
     "agent": Kind(
         ("agent", "model=facts", "pool={pool}", "stage=2", "pictures=false"), "to", ("results-2.jsonl", "table-2.json")
