@@ -70,7 +70,8 @@ SEED ?= 0
 fuzz: setup
 	$(BIN)/python tests/fuzz/run.py $(FUZZ) $(SEED)
 
-# Kills and continues KILLS runs of scengen generate, or with RUNS=demos of scengen demos. They must have the same bytes at the end.
+# Kills and repeats KILLS runs of scengen generate, or of the kinds in RUNS, such as "demos record" or all, which includes the studio
+# while a person judges. They must have the same bytes at the end.
 KILLS ?= 50
 RUNS ?= generate
 kills: setup

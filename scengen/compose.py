@@ -214,6 +214,8 @@ def _logging_restored() -> Iterator[None]:
 
 # --- overrides --------------------------------------------------------------------------------
 
+MAX_DIGITS = 4300
+"""Number of digits of the longest number that Python reads."""
 MAX_DEPTH = 20
 """Largest nesting of lists and groups in an override: more than any file of conf/ needs."""
 LISTS = ("pool", "cameras", "mujoco", "apart", "data", "styles", "splits")
@@ -252,6 +254,8 @@ def _check_override(verb: str, text: str) -> None:
     if _depth(text) > MAX_DEPTH:
         raise BadConfig(f"{quoted} is nested too deeply; quote it if the brackets are part of a name")
     override = _parsed(text)
+    if override is None and re.search(rf"\d{{{MAX_DIGITS + 1}}}", text):
+        raise BadConfig(f"{quoted} has a number of more than {MAX_DIGITS} digits; give a shorter one")
     if override is None or not override.key_or_group:
         raise BadConfig(f"{quoted} is not an override; expected key=value{_quoted(text)}")
     key = override.key_or_group
@@ -261,6 +265,8 @@ def _check_override(verb: str, text: str) -> None:
         raise BadConfig(f"{quoted} has multiple values; give one, or quote a value with commas: {key}='...'")
     if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
         raise BadConfig(f"{quoted}: expected hydra.searchpath=[file:///folder], the only setting of Hydra for scengen")
+    if override.is_delete() and (name := re.split("[./]", key)[0]) not in (known := _known(verb)):
+        raise UnknownName(f"setting of {verb}", name, known)
     if override.is_delete() and not key.startswith("task."):
         raise BadConfig(f"{quoted}: {key} cannot be deleted; leave it out for its default, or give another value")
     if key == "hydra.searchpath":
@@ -275,8 +281,14 @@ def _check_override(verb: str, text: str) -> None:
     in_group = key in ("task", "certify", "executor") and key in groups(verb)
     if in_group and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
         raise BadConfig(f"{quoted}: expected the name of a file of conf/{key} without .yaml; {_files_of(key)}")
-    if key in ("task", "certify", "executor") and override.value() is None:
+    if key in groups(verb) and override.value() is None:
         raise BadConfig(f"{quoted}: leave it out, or name a file of conf/{key}")
+
+
+def _known(verb: str) -> list[str]:
+    """Names of the settings of a command, and of the groups from which it takes files."""
+    own = re.findall(r"^(\w+):", command_file(verb).read_text(), re.M)
+    return [*groups(verb), *(name for name in own if name != "defaults")]
 
 
 def _quoted(text: str) -> str:
@@ -408,7 +420,9 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
     for part in path.split("."):
         if not isinstance(node, DictConfig):
             whole = ".".join(seen)
-            return BadConfig(f"{path}: {whole} has no settings in it; give {whole}=...")
+            return BadConfig(f"{path}: {whole} has no settings in it; give {whole}=... alone")
+        if not seen and part in groups(verb) and part not in node.keys():  # noqa: SIM118
+            return BadConfig(f"{path}: no {part} is chosen; give {part}=NAME, too")
         if part not in node.keys():  # noqa: SIM118  (`in` leaves out what has no value yet)
             known = {*map(str, node), *([] if seen else groups(verb))}
             if seen == ["executor"] and not known:

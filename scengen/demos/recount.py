@@ -160,13 +160,18 @@ class _Light:
         return self.job(number).light()
 
 
+def usual_checks(task: Task) -> CertifySettings:
+    """Settings of the checks of a task where a command line changes none."""
+    return certify_levels(task)["quick"]
+
+
 def checks_of(task: Task, manifest: DemonstrationManifest) -> CertifySettings:
     """Settings of the checks before the oracle plays.
 
     Raises:
         ScengenError: those of the manifest are none.
     """
-    usual = replace(certify_levels(task)["quick"], settle=manifest.config.settle)
+    usual = replace(usual_checks(task), settle=manifest.config.settle)
     found = typed("checks", CertifySettings, {**asdict(usual), **(manifest.checks or {})}, exact=True)
     found.check()
     return found

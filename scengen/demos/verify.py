@@ -28,7 +28,7 @@ from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
 from ..validate.identity import check_versions
-from ..validate.labels import labels_of_draw, labels_of_task
+from ..validate.labels import labels_of_draw, labels_of_task, made_with
 from ..validate.rebuilt import difference, rebuild
 from ..validate.rollout import replay, run
 from ..validate.settings import CertifySettings
@@ -39,7 +39,7 @@ from ..validate.verify.stored import task_of_manifest
 from ..work.fingerprint import fingerprint
 from ..work.parallel import Limits, Workers, each
 from .generate import Job, Others
-from .recount import Recount, checks_of
+from .recount import Recount, checks_of, usual_checks
 from .styles import check_styles, chosen, in_style
 
 
@@ -279,6 +279,10 @@ class _Verification:
         if manifest.config.rules != STRICT:
             told = {"key": "rules", "pool": manifest.config.rules, "installed": STRICT}
             report.differences.append(told)
+        if (here := usual_checks(self.task).settle) != (there := manifest.config.settle):
+            told = {"key": "settle", "pool": f"{there:g} s", "installed": f"{here:g} s"}
+            report.differences.append(told)
+        report.remarks += self._other_makers()
         report.faults += wrong_names(installed, self.task)
         if self.other:
             report.remarks.append(f"{self.other}: what differs between the versions cannot be checked here")
@@ -286,6 +290,16 @@ class _Verification:
             report.remarks.append("made on a machine with different rounding: final states are not compared")
         if oracle and manifest.source != SCRIPTED:
             report.remarks.append(f"source {manifest.source}: there is no oracle to play them again")
+
+    def _other_makers(self) -> Iterator[str]:
+        """Packages and code by which the demonstrations say that they were made, where they are not those here."""
+        manifest, here = self.found.manifest, made_with(self.task)
+        for name in sorted({*here["versions"], *manifest.versions}):
+            made, installed = manifest.versions.get(name, "nothing"), here["versions"].get(name, "nothing")
+            if made != installed:
+                yield f"made with {name} {made}, this is {installed}"
+        if manifest.source_sha256 != here["source_sha256"]:
+            yield "made with different code of the task (source_sha256)"
 
     def _rows(
         self, recount: Recount, workers: Workers, limits: Limits, oracle: bool, progress: Callable[[int], None]

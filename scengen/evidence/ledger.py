@@ -16,6 +16,7 @@ from typing import Any, Literal, get_args
 
 from ..errors import BadConfig, cut
 from ..samplers import task_files
+from ..work.plain import read_plain
 
 Kind = Literal[
     "certified",
@@ -152,10 +153,14 @@ def not_measured(task: str) -> str:
 
 
 def _rows(path: Path) -> Iterator[Evidence]:
-    for number, line in enumerate(path.read_text().splitlines(), 1):
+    try:
+        lines = read_plain(path).decode().splitlines()
+    except (ValueError, OSError) as error:
+        raise BadConfig(f"{path} cannot be read: {cut(str(error))}; restore the file") from None
+    for number, line in enumerate(lines, 1):
         try:
             yield Evidence(**json.loads(line))
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, RecursionError) as error:
             raise BadConfig(f"{path}, line {number}: {cut(str(error))}; restore the file") from None
 
 

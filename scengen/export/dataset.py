@@ -27,8 +27,9 @@ from ..pool.shards import check_groups
 from ..pool.untrusted import READING_MEMORY
 from ..work.machine import memory_bounded
 from ..work.plain import open_plain
-from .lerobot import VIDEO_PATH
+from .lerobot import IMAGES_PREFIX, VIDEO_PATH
 from .schema import TEXT, check_episode, check_film, check_info, is_instruction
+from .streams import ENVIRONMENT
 
 TASK_VERSION = "scengen/task_version"
 """Column of the table of episodes with the version of the task. Recordings of earlier releases lack it."""
@@ -131,6 +132,21 @@ class Recording:
     def cameras(self) -> list[str]:
         """Keys of the videos."""
         return [name for name, feature in self.info["features"].items() if feature["dtype"] == "video"]
+
+    @cached_property
+    def calibrations(self) -> dict[str, dict[str, Any]]:
+        """Calibration of each camera by the key of its video.
+
+        Raises:
+            PoolError: one is missing or damaged.
+        """
+        return {key: self._read_json(f"cameras/{key.removeprefix(IMAGES_PREFIX)}.json") for key in self.cameras}
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """Names of the entries of the environment state; empty if it was not recorded."""
+        names = self.info["features"].get(ENVIRONMENT, {}).get("names")
+        return tuple(names) if isinstance(names, list) else ()
 
     @property
     def picture_size(self) -> tuple[int, int]:

@@ -70,6 +70,13 @@ def check_info(info: Mapping[str, Any]) -> Info:
     for name, column in found.features.items():
         if not all(size >= 1 for size in column.shape) or prod(column.shape) > MAX_ENTRIES:
             raise BadConfig(f"meta/info.json: features.{cut(name)}.shape = {cut(str(column.shape))}")
+        if (
+            isinstance(column.names, list)
+            and column.names
+            and len(column.names) not in (len(column.shape), *column.shape)
+        ):
+            told = f"{len(column.names)} names for entries of shape {column.shape}"
+            raise BadConfig(f"meta/info.json: features.{cut(name)} has {told}")
     return found
 
 

@@ -86,7 +86,7 @@ class TrainingData:
         robot = str(recording.info["robot_type"])
         streams = tuple(observations or (*proprioception(robot), NAME))
         columns, hands = _columns(recording, streams), tuple(_columns(recording, pose_streams(robot)))
-        kept = _kept(recording)
+        kept = kept_episodes(recording)
         found, left_out = [], {"of another task": 0, "failed": 0, "not kept by the curation": 0}
         for episode in recording.read():
             if episode.task != task:
@@ -193,8 +193,12 @@ def _values(episode: EpisodeData, columns: Iterable[str]) -> NDArray[np.float32]
     return np.concatenate(found, axis=1, dtype=np.float32)
 
 
-def _kept(recording: Recording) -> set[int] | None:
-    """Numbers of the episodes that a curation has kept; None without one."""
+def kept_episodes(recording: Recording) -> set[int] | None:
+    """Numbers of the episodes that a curation has kept; None without one.
+
+    Raises:
+        PoolError: the list is damaged.
+    """
     path = recording.folder / KEPT
     if not os.path.lexists(path):
         return None

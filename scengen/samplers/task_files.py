@@ -226,7 +226,8 @@ def _files(search: tuple[str, ...]) -> dict[str, Path]:
     named = [_plain(each) for text in search_path(search) for each in text.partition("=")[2].strip("[]").split(",")]
     offered = [folder.removeprefix("file://") for folder in packages()]
     folders = [conf_dir(), *(Path(folder) for folder in [*named, *offered] if folder)]
-    return {path.stem: path for folder in reversed(folders) for path in sorted((folder / "task").glob("*.yaml"))}
+    paths = (path for folder in reversed(folders) for path in sorted((folder / "task").glob("*.yaml")))
+    return {path.stem: path for path in paths if path.is_file()}  # Hydra passes over pipes and devices, too
 
 
 def _plain(folder: str) -> str:
@@ -247,6 +248,8 @@ def is_folder(folder: str) -> bool:
     return bool(path) and Path(path).is_dir()
 
 
+MAX_TASK_FILE = 1_000_000
+"""Size of the largest task file that is read [bytes]; those of conf/task have up to 10 kB."""
 MAX_BASES = 20
 """Largest number of task files of which each continues the next one."""
 
@@ -259,6 +262,8 @@ def _head(name: str, search: tuple[str, ...] = (), depth: int = 0) -> Mapping[st
         raise UnknownName("task", name, files)
     if depth > MAX_BASES:
         raise BadConfig(f"{files[name]} is its own base; name other files in its defaults")
+    if (size := files[name].stat().st_size) > MAX_TASK_FILE:
+        raise BadConfig(f"{files[name]} has {size} bytes; a task file has at most {MAX_TASK_FILE}")
     try:
         plain = dict(yaml.load(files[name].read_text(), getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
     except (yaml.YAMLError, TypeError, ValueError) as error:

@@ -41,6 +41,8 @@ def _made(kind: str) -> Path:
         _run("demos", "task=domino_single", "n=4", "runs=2", f"to={folder}")
     elif kind == "one":
         _run("demos", "task=domino_single", "n=1", f"to={folder}")
+    elif kind == "brief":  # a goal must last for a fifth of the usual time
+        _run("demos", "task=domino_single", "n=1", "certify.settle=0.2", f"to={folder}")
     elif kind == "failures":  # a short time limit, of which the task of the manifest tells
         _run("demos", "task=domino_single", "task.horizon=3.0", "n=2", "keep=failed", "limit=12", f"to={folder}")
     elif kind == "apart":
@@ -144,6 +146,16 @@ def task(**changed: Any) -> Forge:
     return change
 
 
+def version_of(package: str) -> Forge:
+    return lambda m, rows, failures: m["versions"].update({package: "9.9.9"})
+
+
+def driven(m: Manifest, rows: list[Any], failures: list[Any]) -> None:
+    """What an oracle has played is said to be driven by a person."""
+    m["operator"], m["styles"], m["config"]["styles"] = "op7", {"teleop": len(rows)}, ["teleop"]
+    rows[:] = [replace(row, style="teleop") for row in rows]
+
+
 def times(factor: int) -> Forge:
     def change(m: Manifest, rows: list[Any], failures: list[Any]) -> None:
         m["indices"] *= factor
@@ -206,6 +218,12 @@ DEMONSTRATIONS: dict[str, tuple[str, Forge, str]] = {
     "time limit": ("demonstrations", task(horizon=24.0), "│ horizon"),
     "category": ("demonstrations", task(category="dexterity"), "the category is|│ category"),
     "code": ("demonstrations", task(code="T99"), "the code is|│ code"),
+    "version of scengen": ("demonstrations", version_of("scengen"), "made with scengen 9.9.9, this is"),
+    "platform": ("demonstrations", version_of("platform"), "made with platform 9.9.9, this is"),
+    "code of the task": ("demonstrations", manifest(source_sha256=HASH), "made with different code of the task"),
+    "version of the task": ("demonstrations", manifest(task_version=9), "made on version 9"),
+    "teleoperation": ("demonstrations", driven, "claimed, and not checked: operator op7 drove the robot"),
+    "settling time": ("brief", manifest(), "│ settle"),
     "rules": ("demonstrations", config(rules="paper"), "│ rules"),
     "apart from nothing": ("demonstrations", config(apart=[HASH]), "claimed, and not checked: apart from 1 pools"),
     "policy": ("idle", manifest(policy="ours:v9"), "claimed, and not checked: policy 'ours:v9' drove the robot"),
@@ -270,6 +288,26 @@ def _swapped(plain: Any, of: str = "robot0_eef_pos") -> None:
     names[0], names[1] = names[1], names[0]
 
 
+def _unannounced(folder: Path) -> None:
+    _json("meta/info.json", lambda plain: plain["features"].pop("task_index"), folder)
+
+
+def _narrow(folder: Path) -> None:
+    """The rows of the hand's pose have two numbers, and meta/info.json says so."""
+
+    def told(plain: Any) -> None:
+        feature = plain["features"]["robot0_eef_pos"]
+        feature.update(shape=[2], names=feature["names"][:2])
+
+    table = pq.read_table(folder / ROWS)
+    place = table.schema.get_field_index("robot0_eef_pos")
+    values = [value[:2] for value in table["robot0_eef_pos"].to_pylist()]
+    pq.write_table(
+        table.set_column(place, "robot0_eef_pos", pa.array(values, pa.list_(pa.float32(), 2))), folder / ROWS
+    )
+    _json("meta/info.json", told, folder)
+
+
 def _twice_as_fast(folder: Path) -> None:
     _json("meta/info.json", lambda plain: plain.update(fps=50), folder)
     rows("timestamp", lambda values: values / 2)(folder)
@@ -308,6 +346,8 @@ RECORDINGS: dict[str, tuple[Callable[[Path], None], str]] = {
         partial(_json, "meta/info.json", partial(_swapped, of="observation.environment_state")),
         "INFO",
     ),
+    "column without a description": (_unannounced, "INFO"),
+    "two numbers for a place": (_narrow, "MISSING_FIELD"),
     "rate": (_twice_as_fast, "INFO"),
     "robot": (partial(_json, "meta/info.json", lambda p: p.update(robot_type="panda_suction")), "INFO|not a recording"),
     "paths": (partial(_json, "meta/info.json", lambda p: p.update(data_path="../{chunk_index}.parquet")), "INFO"),

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from others import honest
 
+from scengen import cli
 from scengen.demos.curate.curation import CurateSettings, curate
 from scengen.demos.curate.people import decisions_of_people, scores_by_people
 from scengen.errors import BadConfig, PoolError, ScengenError
@@ -27,6 +28,19 @@ def test_a_score_is_one_of_five_texts(tmp_path, score):
     path.write_text(f"episode,score\n0,{score}\n")
     with pytest.raises(BadConfig, match="it must be 1 to 5"):
         scores_by_people(path, 1)
+
+
+@pytest.mark.parametrize("episode", ["2", "0000000009", "0" * 5000 + "7", "9" * 5000, "-1", "1.0", "\u0661", ""])
+def test_a_line_names_an_episode_that_exists(tmp_path, episode):
+    (tmp_path / "scores.csv").write_text(f"episode,score\n{episode},5\n")
+    with pytest.raises(BadConfig, match="it must be 0 to 1"):
+        scores_by_people(tmp_path / "scores.csv", 2)
+
+
+def test_zeros_before_a_number_are_no_other_episode(tmp_path):
+    (tmp_path / "scores.csv").write_text(f"episode,score\n{'0' * 5000}1,5\n1,4\n")
+    with pytest.raises(BadConfig, match="line 3: 4, an earlier line of this episode says 5"):
+        scores_by_people(tmp_path / "scores.csv", 2)
 
 
 def test_lines_that_contradict_each_other_are_refused(tmp_path):
@@ -66,6 +80,16 @@ def test_a_list_of_kept_episodes_that_is_none_is_refused(mine):
     (mine / "curation" / "kept.json").write_text("[0, 7]")
     with pytest.raises(PoolError, match="there is no episode 7"):
         TrainingData.read(mine)
+
+
+def test_nothing_is_learned_from_episodes_that_people_have_rejected_since(mine, tmp_path, capsys):
+    (mine / "curation").mkdir()
+    (mine / "curation" / "decisions.csv").write_text("episode,verdict,who,why\n0,reject,op1,slips\n")
+    for kept in (None, "[0]"):
+        if kept:
+            (mine / "curation" / "kept.json").write_text(kept)
+        assert cli.run(["train", f"data={mine}", f"to={tmp_path / 'policy'}"]) == 2
+        assert "a verdict about episode 0 that curation/kept.json does not follow; repeat" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("writer", [replace_file, write])

@@ -1,5 +1,6 @@
 """What people who know Hydra try: lists of values, --cfg and --info, completion, examples in every help."""
 
+import os
 import re
 import shlex
 import shutil
@@ -196,10 +197,16 @@ def test_bash_gets_what_comes_after_its_own_word_breaks(tmp_path):
 @pytest.mark.parametrize(
     ("argv", "says"),
     [
-        (("verify", "mujoco", "mujoco.x=1"), "mujoco.x: mujoco has no settings in it; give mujoco=..."),
+        (("verify", "mujoco", "mujoco.x=1"), "mujoco.x: mujoco has no settings in it; give mujoco=... alone"),
         (("new", "task=all", "package=p"), "task = all; give a word"),
         (("generate", "task=domino_single", "n=1", "~certify.robust"), "certify.robust cannot be deleted"),
         (("evaluate", "~client.x"), "client.x cannot be deleted"),
+        (("report", "~budget"), "no setting of report named 'budget'"),
+        (("report", "~n.n"), "no setting of report named 'n'"),
+        (("attack", "pool=x", "task.horizon=3"), "task.horizon: no task is chosen; give task=NAME, too"),
+        (("curate", "stats", "data=x", "executor=null"), "no setting of curate stats named 'executor'"),
+        (("generate", "task=domino_single", "executor=null"), "leave it out, or name a file of conf/executor"),
+        (("generate", "task=domino_single", f"seed={'9' * 5000}"), "a number of more than 4300 digits"),
         (("agent", "model=a=b"), "quote the value twice: 'model=\"a=b\"'"),
         (("show", "pool=x{y"), "quote the value twice: 'pool=\"x{y\"'"),
         (("generate", "task=domino_single", "task.horizon.x=3"), "task.horizon has no settings in it"),
@@ -215,3 +222,16 @@ def test_values_and_deletions_that_hydra_takes_otherwise_have_a_remedy(argv, say
 def test_a_number_of_workers_is_limited_in_every_command(argv, capsys):
     assert cli.run((*argv, "workers=100000000")) == 2
     assert "workers = 100000000; it must be at most 256" in capsys.readouterr().err
+
+
+def test_pipes_and_endless_files_among_tasks_are_passed_over_or_refused(tmp_path, capsys):
+    tasks = tmp_path / "task"
+    tasks.mkdir()
+    os.mkfifo(tasks / "piped.yaml")
+    given = ("tasks", f"hydra.searchpath=[file://{tmp_path}]")
+    assert cli.run(given) == 0
+    with open(tasks / "endless.yaml", "wb") as file:
+        file.truncate(10**12)
+    capsys.readouterr()
+    assert cli.run(given) == 2
+    assert "endless.yaml has 1000000000000 bytes; a task file has at most" in capsys.readouterr().err

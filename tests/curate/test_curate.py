@@ -51,8 +51,9 @@ def curated(folder, replay=True):
 def test_the_episodes_that_the_measurement_of_curation_spoils_are_all_left_out(mine, monkeypatch):
     monkeypatch.setattr(policies, "EVERY", 1)
     policies.spoil(mine)
-    found = [{finding.check for finding in report.findings} for report in curated(mine).reports]
-    assert [bool(checks) for checks in found] == [True, True, True, False], "late, frozen, of the next episode, sound"
+    reports = curated(mine).reports
+    assert [report.flagged for report in reports] == [True, True, True, False], "late, frozen, of the next, sound"
+    found = [{finding.check for finding in report.findings} for report in reports]
     assert "REPLAY" in found[0] & found[2]
 
 
@@ -289,6 +290,14 @@ def test_films_are_compared_with_the_replay(tmp_path, capsys, monkeypatch):
     film = "observation.images.rgb_exo_right_cam"
     clean = curated(tmp_path / "data").reports[0]
     assert not clean.findings and clean.checks[-2:] == ("replay", f"pictures {film}")
+    file = tmp_path / "data" / "meta" / "cameras" / "rgb_exo_right_cam.json"
+    honest = file.read_text()
+    told = json.loads(honest)
+    told["extrinsics"][0][3] += 0.02
+    file.write_text(json.dumps(told))
+    (finding,) = curated(tmp_path / "data").reports[0].findings
+    assert finding.check == "CAMERA" and "rgb_exo_right_cam.json has another calibration" in finding.explanation
+    file.write_text(honest)
     whole = Recording.frames
 
     def late(self, episode, camera):

@@ -81,6 +81,6 @@ def test_what_cannot_be_measured_is_one_line(made, tmp_path):
     folder = Path(shutil.copytree(made, tmp_path / "cut"))
     path = folder / "data" / "chunk-000" / "file-000.parquet"
     pq.write_table(pq.read_table(path).drop_columns(["robot0_eef_pos"]), path)
-    with pytest.raises(BadConfig, match="lacks the column robot0_eef_pos; see scengen curate"):
+    with pytest.raises(BadConfig, match="are missing: robot0_eef_pos; see scengen curate"):
         statistics_of([Recording.open(folder)])
     assert cli.run(["curate", "stats", f"data={made}", f"to={tmp_path / 'page.pdf'}"]) == 2

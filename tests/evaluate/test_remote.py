@@ -199,6 +199,12 @@ def test_arrays_survive_the_wire(encode):
     assert got["b"] == 0.5 and got["c"] == sent["c"]
 
 
+@pytest.mark.parametrize("kind", ["<f4", "=f4", "f4", "float32"])
+def test_a_type_has_the_names_that_numpy_gives_it(kind):
+    node = {b"__ndarray__": True, b"dtype": kind, b"shape": [1], b"data": np.float32([1.5]).tobytes()}
+    assert unpacked(msgpack.packb(node)) == np.float32([1.5])
+
+
 @pytest.mark.parametrize(
     "node",
     [

@@ -199,3 +199,15 @@ def test_the_terminal_tells_what_was_not_measured(of_another_version, capsys, mo
     assert run(("tasks",)) == 0
     [line] = [line for line in capsys.readouterr().out.splitlines() if " domino_single " in line]
     assert " of " not in line
+
+
+def test_rows_without_an_end_are_one_line(empty):
+    path = empty / "plan" / f"{TASK.name}.jsonl"
+    path.parent.mkdir()
+    with open(path, "wb") as file:
+        file.truncate(10**12)
+    with pytest.raises(BadConfig, match="it has 1000000000000 bytes; at most .* are read; restore the file"):
+        ledger.read("plan", TASK.name)
+    path.write_text("[" * 100_000 + "\n")
+    with pytest.raises(BadConfig, match="line 1: .*; restore the file"):
+        ledger.read("plan", TASK.name)

@@ -77,6 +77,56 @@ def test_links_and_pipes_are_not_opened(folder, tmp_path, table, kind):
     refused(lambda: [*Recording.open(folder).read()], "outside the folder|plain file|meta/info.json is missing")
 
 
+FLAT = pa.list_(pa.float32(), 2)
+
+
+@pytest.mark.parametrize(
+    ("column", "says"),
+    [
+        (pa.array(["a", "b", "c"]), "column action holds string, meta/info.json says float32"),
+        (pa.array([0.0, 1.0, 2.0]), "has not the shape"),
+        (pa.array([[0, 1]] * 3), "column action holds int64, meta/info.json says float32"),
+        (pa.array([[0.0, 1.0], None, [0.0, 1.0]], FLAT), "lists to be of size=2"),
+        (pa.nulls(3), "column action holds null"),
+    ],
+)
+def test_a_column_has_the_kind_and_the_shape_that_are_announced(folder, column, says):
+    rows = {"frame_index": pa.array(range(3)), "action": column}
+    pq.write_table(pa.table(rows), folder / "data/chunk-000/file-000.parquet")
+    refused(lambda: [*Recording.open(folder).read()], says)
+
+
+def test_a_column_of_texts_is_left_out_if_it_is_announced(folder):
+    rows = {"frame_index": pa.array(range(3)), "note": pa.array(["a", "b", None])}
+    pq.write_table(pa.table(rows), folder / "data/chunk-000/file-000.parquet")
+    refused(lambda: [*Recording.open(folder).read()], "only numbers are read")
+    features = {**INFO["features"], "note": {"dtype": "string", "shape": [1]}}
+    (episode,) = Recording.open(described(folder, features=features)).read()
+    assert [*episode.columns] == ["frame_index"]
+
+
+def test_tables_have_each_column_once_and_all_files_the_same(folder):
+    table = pq.read_table(folder / "data/chunk-000/file-000.parquet")
+    pq.write_table(table.select(["action"]), folder / "data/chunk-000/file-001.parquet")
+    refused(lambda: [*Recording.open(folder).read()], "the files have different columns")
+    (folder / "data/chunk-000/file-001.parquet").unlink()
+    table = table.append_column("action", table["action"])
+    pq.write_table(table, folder / "data/chunk-000/file-000.parquet")
+    refused(lambda: [*Recording.open(folder).read()], "it has two columns action")
+
+
+@pytest.mark.parametrize("rows", [{"task_index": [[1]], "task": ["a"]}, {"task_index": [0, 0], "task": ["a", "b"]}, {}])
+def test_every_instruction_has_a_separate_number(folder, rows):
+    pq.write_table(pa.table(rows or {"other": [1]}), folder / "meta/tasks.parquet")
+    refused(lambda: Recording.open(folder).tasks, "a separate task_index")
+
+
+@pytest.mark.parametrize("told", [{"shape": [-2]}, {"shape": [2**40]}, {"names": ["x", "y", "z"]}])
+def test_shapes_and_names_that_cannot_be_are_refused(folder, told):
+    features = {"action": {**INFO["features"]["action"], **told}}
+    refused(lambda: Recording.open(described(folder, features=features)), "features.action")
+
+
 def test_a_folder_that_leads_elsewhere_is_not_read(folder, tmp_path):
     shutil.move(folder / "data", tmp_path / "data")
     os.symlink(tmp_path / "data", folder / "data")

@@ -155,8 +155,55 @@ KEYS = [
     "x" * LONG,
     "task/x",
 ]
-PATHS_IN = ["pool", "to", "json", "junit", "mesh", "film"]
-"""Settings that name files and folders."""
+PATHS_IN = [
+    *("pool", "to", "json", "junit", "mesh", "film", "data", "policy", "client", "model", "prices", "ycb", "records"),
+    *("hits", "apart", "attack", "within", "device", "edition", "version", "key"),
+]
+"""Settings that name files and folders, or could."""
+SCHEMES = ["", "", "", "", "transcript:", "file:", "replay:", "ws://", "zmq://", "http://", "pkg://", "module:"]
+"""What stands before a path, or nothing."""
+PARTS = [
+    "certify",
+    "executor",
+    "task",
+    "command",
+    "facts",
+    "clients",
+    "limits",
+    "cues",
+    "editions",
+    "hydra/job_logging",
+]
+"""Groups of configurations, and folders of conf that are none."""
+OPTIONS = [
+    "full",
+    "quick",
+    "nope",
+    "domino_single",
+    "local",
+    "verify",
+    "none",
+    "",
+    "null",
+    "quick,full",
+    "[quick,full]",
+    "../task",
+]
+"""Options of groups."""
+DELETED = [
+    *("task", "task.axes", "task.axes.wide_gaps", "task.id", "task.id.gap", "task.horizon", "task.family", "certify"),
+    *(
+        "certify.robust",
+        "certify.robust.runs",
+        "certify.rest.seconds",
+        "executor",
+        "executor.address",
+        "defaults",
+        "~n",
+    ),
+    *("n=3", "n=", "budget", "budget.tokens", "certify=quick", "task=domino_single", "hydra", "hydra/launcher", "[n]"),
+]
+"""What a line deletes."""
 
 NONSENSE = {
     "tiers": ["[]", "[nope]", "[null]", "random", "[random,random]"],
@@ -236,6 +283,11 @@ class Grammar:
             "measure": ("kind", "belief"),
             "asset": ("name", "cup"),
             "new": ("package", "lab_tasks"),
+            "agent": ("model", "idle"),
+            "curate": ("data", str(self.place / "recording")),
+            "curate stats": ("data", str(self.place / "recording")),
+            "train": ("data", str(self.place / "recording")),
+            "export recipe": ("data", str(self.place / "recording")),
         }
         if verb == "new":
             found.append(("task", "slide_home"))
@@ -256,6 +308,7 @@ class Grammar:
                 "key",
                 "bare",
                 "delete",
+                "group",
                 "add",
                 "id",
                 "task",
@@ -275,13 +328,19 @@ class Grammar:
             paths = [n for n in names if n in PATHS_IN] or [key]
             key = pick.choice(paths)
             settings[:] = [(k, v) for k, v in settings if k != key]
-            settings.append((key, self._path()))
+            several = pick.choice((f"{self._path()},{self._path()}", f"[{self._path()},{self._path()}]"))
+            path = several if pick.random() < 0.1 else pick.choice(SCHEMES) + self._path()
+            settings.append((key, path))
         elif kind == "key":
             settings.append((pick.choice(("", "", "+", "++", "~")) + pick.choice(KEYS), self._value()))
         elif kind == "bare":
             settings.append((pick.choice([*KEYS, *TEXTS, *NESTED, "--help-me", "-", key]), None))
         elif kind == "delete":
-            settings.append((f"~{pick.choice([*KEYS, *names])}", None))
+            settings.append((f"~{pick.choice([*KEYS, *names, *DELETED, *DELETED])}", None))
+        elif kind == "group":
+            package = pick.choice(("", "", "", "@x", "@_global_", "@certify.robust", "@:", "@"))
+            key = f"{pick.choice(('', '', '+', '++', '~'))}{pick.choice(PARTS)}{package}"
+            settings.append((key, pick.choice(OPTIONS)))
         elif kind == "add":
             settings.append((f"+{key}", self._value()))
         elif kind == "id":
@@ -353,6 +412,20 @@ class Grammar:
                 f"{self.pool}/manifest.json",
                 f"{self.pool},{self.pool}",
                 f"{place}/cut",
+                f"{place}/sparse",
+                f"{place}/pointer.stl",
+                f"{place}/socket",
+                f"{place}/recording",
+                f"{place}/demonstrations",
+                f"{place}/demonstrations/demonstrations.json",
+                *(f"{place}/piped/{kind}" for kind in ("pool", "recording", "demonstrations", "policy", "run")),
+                *(f"{place}/sparse_{kind}" for kind in ("pool", "recording", "demonstrations", "policy", "run")),
+                f"{place}/both",
+                "/dev/zero",
+                "/dev/stdin",
+                "/dev/tty",
+                "/proc/self/environ",
+                "/proc/self/fd/0",
                 f"{place}/wrong.txt",
             ]
         )

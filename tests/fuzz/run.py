@@ -8,6 +8,7 @@ import re
 import resource
 import shutil
 import signal
+import socket
 import sys
 import tempfile
 import time
@@ -32,7 +33,7 @@ WALL_LIMIT = 600
 REMEDY = re.compile(
     r"did you mean|known: |expected |must |see scengen|see the |choose |name (a|an|the|it|one|another) |name=|give |"
     r"leave it|quote|make (it|room)|ask for|say |repeat |restore|generate the pool|is not an option|install|"
-    r"accepts one pool|correct |delete |wait for|needs (either )?\w+=|widen|wants a display"
+    r"accepts one pool|it accepts |correct |delete |wait for|needs (either )?\w+=|widen|wants a display"
 )
 """Words with which an error says what would be right."""
 
@@ -93,6 +94,7 @@ def playground() -> Iterator[Path]:
         (place / "cut").mkdir()
         (place / "cut" / "manifest.json").write_text("{")
         shutil.copytree(REFERENCE, Path(made, "pool"))
+        _strange(place)
         (Path(made, "cwd")).mkdir()
         stack.callback(os.chdir, here)
         os.chdir(Path(made, "cwd"))
@@ -105,6 +107,41 @@ def playground() -> Iterator[Path]:
             yield place
         finally:
             shutil.rmtree(place, ignore_errors=True)
+
+
+MARKED = {
+    "pool": "manifest.json",
+    "recording": "meta/info.json",
+    "demonstrations": "demonstrations.json",
+    "policy": "policy.json",
+    "run": "settings.json",
+}
+"""Folders of commands by their kind, with the file that is read first."""
+
+
+def _strange(place: Path) -> None:
+    """Make a recording, demonstrations, and files that wait, never end, or stand for others."""
+    (place / "pointer.stl").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n")
+    _sparse(place / "sparse")
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(place / "socket"))
+    for kind, mark in MARKED.items():
+        piped, sparse = place / "piped" / kind / mark, place / f"sparse_{kind}" / mark
+        for path in (piped, sparse):
+            path.parent.mkdir(parents=True)
+        os.mkfifo(piped)
+        _sparse(sparse)
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        assert cli.run(["record", f"pool={REFERENCE}", f"to={place / 'recording'}", "cameras=none", "n=2"]) == 0
+        assert cli.run(["demos", "task=domino_single", "n=1", f"to={place / 'demonstrations'}"]) == 0
+    shutil.copytree(REFERENCE, place / "both")
+    shutil.copytree(place / "demonstrations", place / "both", dirs_exist_ok=True)
+
+
+def _sparse(path: Path) -> None:
+    """Make a file of a terabyte that needs no room."""
+    with open(path, "wb") as file:
+        file.truncate(10**12)
 
 
 def robosuite_runs() -> bool:
@@ -142,6 +179,14 @@ WORK = (
     "scengen.studio.app.Studio",
     "scengen.cli.commands.asset.encode",
     "scengen.intake.asset.make_asset",
+    "scengen.agents.runner.exams",
+    "scengen.demos.generate.generate_demonstrations",
+    "scengen.cli.commands.demos.generate_demonstrations",
+    "scengen.demos.curate.curation._examined",
+    "scengen.cli.commands.train.train",
+    "scengen.demos.teleop.collect.Run",
+    "scengen.cli.commands.demos_pad.Run",
+    "scengen.evaluate.remote.servers.Server._reach",
 )
 """Where work starts that takes seconds: a command line that gets so far has been accepted."""
 ROBOSUITE_WORK = {"scengen.envs.agreement.compare_all"}

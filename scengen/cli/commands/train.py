@@ -5,10 +5,11 @@ from pathlib import Path
 from rich.table import Table
 
 from ...compose import load_task
+from ...demos.curate.people import ACCEPT, DECISIONS, decisions_of_people
 from ...errors import BadConfig, cut
-from ...export.dataset import Recording
+from ...export.dataset import CURATION, Recording
 from ...export.recording import RecordSettings, record
-from ...learn.data import TrainingData
+from ...learn.data import KEPT, TrainingData, kept_episodes
 from ...learn.train import Trained, TrainSettings, train
 from ...pool.demonstrations import Demonstrations, is_demonstrations
 from ...pool.manifest import MANIFEST
@@ -25,6 +26,7 @@ def command(arguments: Arguments) -> int:
     settings = read("train", arguments, TrainSettings)
     settings.check()
     recording = _recording(settings, arguments)
+    _check_decisions(Recording.open(recording))
     data = TrainingData.read(recording, settings.observations, settings.demonstrations, settings.task)
     left_out = ", ".join(f"{count} {why}" for why, count in data.left_out.items() if count)
     if left_out:
@@ -44,6 +46,17 @@ def command(arguments: Arguments) -> int:
         say(f"wrote {settings.to}: policy.json, weights.npz, loss.svg")
     say(f"next: scengen evaluate policy={settings.to} pool=...")
     return OK
+
+
+def _check_decisions(recording: Recording) -> None:
+    """Raise `ScengenError` if people have decided otherwise than the list of kept episodes says."""
+    count, kept = len(recording.episodes), kept_episodes(recording)
+    path = recording.folder / CURATION / DECISIONS
+    decided = decisions_of_people(path, count)
+    other = [n for n, each in decided.items() if (each.verdict == ACCEPT) != (kept is None or n in kept)]
+    if other:
+        told = f"{path} has a verdict about episode {other[0]} that {KEPT} does not follow"
+        raise BadConfig(f"{told}; repeat scengen curate data={recording.folder}")
 
 
 def _recording(settings: TrainSettings, arguments: Arguments) -> str:

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from ...control.loop import ACTION
 from ...control.teleop import LARGEST_CHANGE
-from ...envs.observations import proprioception
+from ...envs.observations import action_names, proprioception, streams_of
 from ...export.dataset import EpisodeData, Recording
+from ...export.lerobot import INDEX_FEATURES
 from ...export.recording import CONTROL_ACTIONS, STATE
 from ...export.replay import asks_for_motion
+from ...export.schema import TEXT
 from ...export.streams import ENVIRONMENT
 from ...pool.demonstrations import POLICY
 from ...robots.panda import Names
@@ -33,6 +35,8 @@ MAX_BODY_JUMP = 0.03
 """Largest displacement of a body between two rows that its velocities do not explain [m]."""
 BLOW_SHARE = 1.0
 """Share of a body's displacement at its larger speed that a blow between two rows may explain in addition."""
+MISSING_FIELD = "MISSING_FIELD"
+"""Name of the check of columns."""
 MIN_ROWS = 15
 """Smallest number of rows of an episode (lerobot-lint)."""
 MIN_SECONDS = 1.0
@@ -82,14 +86,31 @@ def found(
 
 def fields(subject: Subject) -> Iterator[Finding]:
     """Whether every column of meta/info.json is there."""
-    features = subject.recording.info["features"]
-    needed = [*proprioception(str(subject.recording.info["robot_type"])), STATE, "action", CONTROL_ACTIONS]
-    told = [*needed, *(n for n, f in features.items() if f["dtype"] != "video")]
-    missing = [name for name in dict.fromkeys(told) if name not in subject.episode.columns]
+    features, columns = subject.recording.info["features"], subject.episode.columns
+    needed = _shapes(str(subject.recording.info["robot_type"]))
+    told = [*needed, *(n for n, f in features.items() if f["dtype"] not in ("video", TEXT))]
+    missing = [name for name in dict.fromkeys(told) if name not in columns]
     if missing:
-        yield found("MISSING_FIELD", f"columns of meta/info.json are missing: {', '.join(missing)}")
+        yield found(MISSING_FIELD, f"columns of meta/info.json are missing: {', '.join(missing)}")
+    other = [name for name, shape in needed.items() if name in columns and not _has_shape(columns[name], shape)]
+    if other:
+        yield found(MISSING_FIELD, f"columns do not have the shapes of the robot: {', '.join(other)}")
     if (length := subject.episode.about["length"]) != len(subject.episode):
         yield found("LENGTH_FIELD", "the table of episodes has another length", told=length, rows=len(subject.episode))
+
+
+def _shapes(robot: str) -> dict[str, tuple[int | None, ...]]:
+    """Columns that every recording of a robot has, with the shapes of a row; None stands for any number."""
+    own, actions = streams_of(robot), len(action_names(robot))
+    made: dict[str, tuple[int | None, ...]] = {name: own[name].shape for name in proprioception(robot)}
+    made |= {STATE: (None,), "action": (actions,), CONTROL_ACTIONS: (None, actions), "next.success": ()}
+    return {**made, **{name: feature.shape for name, feature in INDEX_FEATURES.items()}}
+
+
+def _has_shape(values: Values, shape: tuple[int | None, ...]) -> bool:
+    """Whether the rows of a column have a shape, see `_shapes`."""
+    own = values.shape[1:]
+    return len(own) == len(shape) and all(b in (None, a) for a, b in zip(own, shape, strict=True))
 
 
 def index(subject: Subject) -> Iterator[Finding]:
@@ -205,7 +226,7 @@ def bodies(subject: Subject) -> Iterator[Finding]:
     """Whether bodies are where their velocities take them. An event of the scene may move a body: the replay knows."""
     if ENVIRONMENT not in subject.episode.columns:
         return
-    names = subject.recording.info["features"][ENVIRONMENT]["names"]
+    names = subject.recording.entries
     state, period = subject.column(ENVIRONMENT), 1.0 / subject.recording.fps
     for body, start in movable_bodies(names).items():
         place = state[:, start : start + 3]
@@ -243,7 +264,7 @@ def check_rows(episode: EpisodeData, recording: Recording) -> tuple[tuple[str, .
     findings: list[Finding] = []
     subject = Subject(episode, recording)
     for name, check in CHECKS.items():
-        if any(one.check in ("MISSING_FIELD", "NAN") for one in findings):
+        if any(one.check in (MISSING_FIELD, "NAN") for one in findings):
             break
         made.append(name)
         findings += check(subject)

@@ -25,14 +25,13 @@ from ...agents.models import made
 from ...errors import PoolError
 from ...export.dataset import CURATION, EpisodeData, Recording
 from ...export.recording import CONTROL_ACTIONS
-from ...export.streams import ENVIRONMENT
 from ...pool.files import read_json_file, replace_file, sha256
 from ...work.parallel import UNTRUSTED_LIMITS, Workers, each
 from ...work.targets import try_folder
 from .checks import Subject, check_rows, found
 from .findings import REPORTS, SCHEMA, EpisodeReport, Finding, read_reports
 from .labels import CLAIMED
-from .people import DECISIONS, SCORES, Decision, decisions_of_people, scores_by_people
+from .people import ACCEPT, DECISIONS, REJECT, SCORES, Decision, decisions_of_people, scores_by_people
 from .remarks import with_remarks
 from .replays import Recorded, Replayed, comparison_of, lost, replayed
 from .score import KEPT_SCORE, scores_of, terms_of
@@ -128,7 +127,8 @@ def _examined(
         readable = not any(one.check in ("MISSING_FIELD", "NAN") for one in findings)
         terms.append(terms_of(episode, recording.fps) if readable else {})
         tasks.append(episode.task)
-        solved.append(readable and bool(episode.about["scengen/success"]) and bool(episode.columns["next.success"][-1]))
+        reached = episode.about["scengen/success"], episode.columns["next.success"][-1]
+        solved.append(readable and all(map(bool, reached)))
         if readable:
             findings += whole.of_episode(episode)
             films, told = _videos(episode, recording)
@@ -144,9 +144,18 @@ def _examined(
                 task = compose.load_task(episode.task, search)
                 if (robot := recording.info["robot_type"]) != task.embodiment:
                     findings.append(found("INFO", f"robot_type is {robot}, that of the task is {task.embodiment}"))
-                entries = recording.info["features"].get(ENVIRONMENT, {}).get("names") or ()
                 jobs.append(
-                    Recorded.of(episode.number, task, episode.about, episode.columns, entries, size, films, frozen)
+                    Recorded.of(
+                        episode.number,
+                        task,
+                        episode.about,
+                        episode.columns,
+                        recording.entries,
+                        size,
+                        films,
+                        recording.calibrations,
+                        frozen,
+                    )
                 )
         else:
             whole.skip(episode)
@@ -212,8 +221,8 @@ def _decided(recording: Recording, reports: tuple[EpisodeReport, ...], decisions
     """Stage 3: a person's verdict decides; without one, episodes with a sufficient score and no flag are kept."""
     scored = [report for report in reports if report.score >= KEPT_SCORE]
     clean = [report.episode for report in scored if not report.flagged]
-    accepted = {k for k, decision in decisions.items() if decision.verdict == "accept"}
-    rejected = {k for k, decision in decisions.items() if decision.verdict == "reject"}
+    accepted = {k for k, decision in decisions.items() if decision.verdict == ACCEPT}
+    rejected = {k for k, decision in decisions.items() if decision.verdict == REJECT}
     kept = sorted({*clean, *accepted} - rejected)
     funnel = {"recorded": len(reports), "scored": len(scored), "without findings": len(clean), "kept": len(kept)}
     return Curated(recording, reports, decisions, tuple(kept), funnel)

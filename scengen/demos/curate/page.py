@@ -79,8 +79,9 @@ def _line(number: int, decision: Decision) -> str:
 def plot(episode: EpisodeData, report: EpisodeReport, recording: Recording) -> str:
     """Positions of the hands and actions over time, with the frames of the findings shaded."""
     columns: Mapping[str, np.ndarray] = episode.columns
-    positions = [name for number in range(2) if (name := f"{Names(number).arm}eef_pos") in columns]
-    if "action" not in columns or not positions:
+    places = {name: columns[name] for number in range(2) if (name := f"{Names(number).arm}eef_pos") in columns}
+    positions = [name for name, values in places.items() if values.shape[1:] == (3,)]
+    if "action" not in columns or columns["action"].ndim != 2 or not positions:
         return ""
     figure = Figure(figsize=(10, 3.6))
     above, below = figure.subplots(2, 1, sharex=True)

@@ -18,7 +18,11 @@ SCORE_COLUMNS = ("episode", "score")
 DECISION_COLUMNS = ("episode", "verdict", "who", "why")
 SCORE_TEXTS = ("1", "2", "3", "4", "5")
 """Scores of people."""
-VERDICTS = ("accept", "reject")
+ACCEPT = "accept"
+"""Verdict that keeps an episode."""
+REJECT = "reject"
+"""Verdict that keeps an episode out."""
+VERDICTS = (ACCEPT, REJECT)
 """Verdicts of people."""
 MAX_CSV = 1_000_000
 """Size of the largest table of people that is read [bytes]."""

@@ -14,6 +14,7 @@ from ...envs.object_state import ObjectState, bodies_of
 from ...envs.observations import cameras_of, privileged, streams_of
 from ...episode import Episode, Outcome, Rules
 from ...errors import ScengenError
+from ...export.cameras import calibration
 from ...export.dataset import rules_of
 from ...export.lerobot import IMAGES_PREFIX, INDEX_FEATURES
 from ...export.recording import CONTROL_ACTIONS, STATE
@@ -31,6 +32,8 @@ from .videos import Probe, compared, stands_still
 MAX_REPLAY_ERROR = 1e-6
 """Largest difference of a stream [its unit], and relative to a value beyond 1: streams are stored in single
 precision."""
+MAX_CAMERA_ERROR = 2e-6
+"""Largest difference of a number of a calibration: they are rounded to 1e-6."""
 FIRST = "_pos.x"
 """End of the name of a body's first entry in the environment state."""
 RESULTS = ("reward", "next.reward", "next.success", "next.done")
@@ -62,6 +65,8 @@ class Recorded:
     """Width and height of the pictures [pixels]."""
     films: Mapping[str, tuple[Probe, ...]]
     """Parts of the film of each camera."""
+    cameras: Mapping[str, Mapping[str, Any]]
+    """Calibration of each camera."""
     frozen: Mapping[str, Finding]
     """The finding of each camera whose picture stands still while the arm moves. It holds if that of the replay moves,
     and if there is none."""
@@ -76,6 +81,7 @@ class Recorded:
         entries: Sequence[str],
         size: tuple[int, int],
         films: Mapping[str, tuple[Probe, ...]],
+        cameras: Mapping[str, Mapping[str, Any]],
         frozen: Mapping[str, Finding],
     ) -> "Recorded":
         """The parts of an episode that a replay compares.
@@ -92,7 +98,7 @@ class Recorded:
         told = {name: value for name, value in about.items() if not name.startswith("stats/")}
         params, horizon = json.loads(about["scengen/params"]), float(about["scengen/horizon"])
         actions, rows = columns[CONTROL_ACTIONS], (states, results, told, tuple(entries))
-        return cls(number, task, params, horizon, rules_of(about), actions, *rows, size, films, frozen)
+        return cls(number, task, params, horizon, rules_of(about), actions, *rows, size, films, cameras, frozen)
 
     @property
     def bodies(self) -> list[str]:
@@ -180,6 +186,7 @@ def _played(recorded: Recorded, scenario: Scenario, world: World, text: str) -> 
     if recorded.actions.shape[2] != ACTION * len(hands(robot)):
         return _fault(recorded, f"the actions are not those of {robot}")
     with ExitStack() as stack:
+        cameras = tuple(_wrong_cameras(recorded, scenario, world))
         films = _Films(recorded, scenario, world, stack)
         episode, over = Episode(scenario, world, recorded.horizon, recorded.rules), None
         seconds = 0.0
@@ -200,7 +207,28 @@ def _played(recorded: Recorded, scenario: Scenario, world: World, text: str) -> 
     labels = (*wrong_result(recorded.told, over == "success", seconds), *_wrong_absent(recorded, world))
     if episode.outcome != "success":
         return _fault(recorded, f"replayed, the goal is not reached: {episode.reason or 'no outcome'}")
-    return Replayed((*films.findings, *labels), ("replay", *films.checks), unknown)
+    return Replayed((*films.findings, *labels, *cameras), ("replay", *films.checks), unknown)
+
+
+def _wrong_cameras(recorded: Recorded, scenario: Scenario, world: World) -> Iterator[Finding]:
+    """Whether the cameras stand where their files say."""
+    views = cameras_of(recorded.task.embodiment)
+    for key, told in recorded.cameras.items():
+        name = key.removeprefix(IMAGES_PREFIX)
+        made = calibration(world, views[name], *recorded.size, scenario.orientation)
+        if told.keys() != made.keys() or not all(_near(told[entry], made[entry]) for entry in made):
+            yield Finding("CAMERA", "error", (), {}, f"meta/cameras/{name}.json has another calibration")
+
+
+def _near(told: Any, made: Any) -> bool:
+    """Whether an entry of a calibration is that of the replay, up to its rounding."""
+    if isinstance(made, str):
+        return bool(told == made)
+    try:
+        given, own = np.array(told, float), np.array(made, float)
+    except (TypeError, ValueError):
+        return False
+    return given.shape == own.shape and np.allclose(given, own, 0.0, MAX_CAMERA_ERROR)
 
 
 def _wrong_absent(recorded: Recorded, world: World) -> Iterator[Finding]:

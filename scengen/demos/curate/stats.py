@@ -18,7 +18,7 @@ from ...export.replay import asks_for_motion
 from ...export.streams import ENVIRONMENT
 from ...robots.panda import Names
 from ...samplers.task_files import paper_lengths
-from .checks import movable_bodies
+from .checks import MISSING_FIELD, Subject, fields, movable_bodies
 from .score import terms_of
 
 PHASES = 50
@@ -97,10 +97,8 @@ def statistics_of(recordings: Sequence[Recording]) -> list[TaskStats]:
     groups: dict[str, list[tuple[Recording, EpisodeData]]] = defaultdict(list)
     for recording in recordings:
         for episode in recording.read():
-            if missing := [
-                name for name in ("action", CONTROL_ACTIONS, "robot0_eef_pos") if name not in episode.columns
-            ]:
-                raise BadConfig(f"{recording.folder} lacks the column {missing[0]}; see scengen curate")
+            if wrong := [one for one in fields(Subject(episode, recording)) if one.check == MISSING_FIELD]:
+                raise BadConfig(f"{recording.folder}: {wrong[0].explanation}; see scengen curate")
             groups[episode.task].append((recording, episode))
     return [_of_task(task, episodes) for task, episodes in sorted(groups.items())]
 
@@ -139,9 +137,8 @@ def way_of(recording: Recording, episode: EpisodeData) -> str:
     """
     if ENVIRONMENT not in episode.columns:
         return ""
-    names = recording.info["features"][ENVIRONMENT]["names"]
     state, first = np.asarray(episode.columns[ENVIRONMENT], float), dict[str, int]()
-    for body, start in movable_bodies(names).items():
+    for body, start in movable_bodies(recording.entries).items():
         away = np.linalg.norm(state[:, start : start + 3] - state[0, start : start + 3], axis=1) > MOVED
         if away.any():
             first[body] = int(away.argmax())

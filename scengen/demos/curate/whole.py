@@ -106,8 +106,7 @@ class Whole:
         made: dict[str, Sequence[str] | None] = {n: feature_of(n, stream).names for n, stream in own.items()}
         made |= {"action": action_names(robot), CONTROL_ACTIONS: ("period", "action")}
         made[STATE] = named(own, proprioception(robot))
-        told = features.get(ENVIRONMENT, {}).get("names") or []
-        made[ENVIRONMENT] = state_of(told, robot).names
+        made[ENVIRONMENT] = state_of(self.recording.entries, robot).names
         for name, feature in features.items():
             kind = next((kind for kind in KINDS if name.endswith(f"_{kind}")), None)
             entries = made.get(name) or (kind and [f"{name}.{entry}" for entry in KINDS[kind]])
@@ -117,9 +116,9 @@ class Whole:
     @property
     def claimed(self) -> list[str]:
         """Files with claims that the rows do not decide."""
-        pictures = ["statistics of pictures", "meta/cameras"] if self.recording.cameras else []
+        pictures = ["statistics of pictures"] if self.recording.cameras else []
         native = ["native/"] if (self.recording.folder / "native").is_dir() else []
-        return [*self.recording.texts, *pictures, *native, "meta/scengen.json"]
+        return [*self.recording.texts, *pictures, *native, "meta/scengen.json", "README.md"]
 
 
 def alike(told: Any, made: Mapping[str, Any]) -> bool:

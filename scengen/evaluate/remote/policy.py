@@ -110,9 +110,9 @@ class RemotePolicy:
             if isinstance(part, np.ndarray) and self._past and part.ndim == 3 and len(part) == 1:
                 part = part[0]
             if not isinstance(part, np.ndarray) or part.ndim != 2:
-                told = part.shape if isinstance(part, np.ndarray) else cut(repr(part))
+                told = f"has the shape {part.shape}" if isinstance(part, np.ndarray) else f"is {cut(repr(part))}"
                 expected = "(1, chunk, n)" if self._past else "(chunk, n)"
-                raise self.server.fault(f"{name} of a reply has the shape {told}; it must be {expected}")
+                raise self.server.fault(f"{name} of a reply {told}; it must be an array of shape {expected}")
             parts.append(part)
         told = ", ".join(f"{name} {part.shape}" for name, part in zip(self.client.action, parts, strict=True))
         if len({len(part) for part in parts}) > 1 or sum(part.shape[1] for part in parts) != self._size:

@@ -246,7 +246,9 @@ class Gr00t(Server):
             raise Lost(f"the connection is lost ({error})") from None
         reply = unpacked(message)
         if isinstance(reply, Mapping) and "error" in reply:
-            raise self.fault(f"the server reports an error: {_last_line(str(reply['error']))}")
+            why = _last_line(str(reply["error"]))
+            hint = " (does it need a key?)" if "unauthori" in why.lower() else ""
+            raise self.fault(f"the server reports an error: {why}{hint}")
         return reply
 
 

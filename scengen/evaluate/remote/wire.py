@@ -20,11 +20,12 @@ MAX_ENTRIES = 10_000
 MAX_AXES = 6
 """Largest number of axes of an array. GR00T's pictures have five."""
 DTYPES = {
-    dtype.str: dtype
+    name: dtype
     for kind in ("?", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8")
-    for dtype in (np.dtype(f"<{kind}"), np.dtype(f">{kind}"))
+    for dtype in (np.dtype(f">{kind}"), np.dtype(f"<{kind}"))
+    for name in (dtype.str, dtype.name, kind)
 }
-"""Accepted types of arrays, by the names in messages."""
+"""Accepted types of arrays, by the names in messages; a name without an order of bytes is little-endian."""
 
 
 class BadMessage(ScengenError):
@@ -98,7 +99,7 @@ def _array(kind: Any, shape: Any, data: Any) -> NDArray[Any]:
     Raises:
         BadMessage: the description is not one of an array of numbers, or the bytes are not as many.
     """
-    dtype = DTYPES.get(kind) if isinstance(kind, str) else None
+    dtype = DTYPES.get(kind.removeprefix("=")) if isinstance(kind, str) else None
     if dtype is None:
         raise BadMessage(
             f"an array in a message has the type {cut(repr(kind))}; numbers of at most 8 bytes are accepted"
