@@ -148,6 +148,16 @@ class Names:
         return f"{self.hand}suction"
 
     @property
+    def finger_pads(self) -> list[str]:
+        """Bodies of the jaw's two pads."""
+        return [f"{self.hand}finger_joint{i}_tip" for i in (1, 2)]
+
+    @property
+    def cup_pads(self) -> str:
+        """Body of a suction cup's four pads."""
+        return f"{self.hand}suction_pad"
+
+    @property
     def first_pad(self) -> str:
         """First of a suction cup's four pads."""
         return f"{self.hand}pad0_collision"

@@ -91,6 +91,12 @@ class Arm:
         """Whether the suction cup pulled at the last physics step: it was switched on, and its lip was closed."""
         return bool(self.data.ctrl[self._cup] > 0.0)
 
+    def grips(self, body: str) -> bool:
+        """Whether both pads of the jaw touch a body, or the suction cup that touches it pulls."""
+        names = Names(self.number)
+        pads = [names.cup_pads] if self.suction else names.finger_pads
+        return (not self.suction or self.sealed) and all(self.world.touching(pad, body) for pad in pads)
+
     @property
     def idle(self) -> NDArray[np.float64]:
         """Action without motion that keeps the gripper command, shape (7,)."""
