@@ -148,9 +148,9 @@ class Names:
         return f"{self.hand}suction"
 
     @property
-    def finger_pads(self) -> list[str]:
-        """Bodies of the jaw's two pads."""
-        return [f"{self.hand}finger_joint{i}_tip" for i in (1, 2)]
+    def finger_bodies(self) -> list[tuple[str, str]]:
+        """Bodies of the jaw's two fingers: the pad and the rest of each."""
+        return [(f"{self.hand}finger_joint{i}_tip", f"{self.hand}{side}finger") for i, side in ((1, "left"), (2, "right"))]
 
     @property
     def cup_pads(self) -> str:
