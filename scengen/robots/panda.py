@@ -150,7 +150,9 @@ class Names:
     @property
     def finger_bodies(self) -> list[tuple[str, str]]:
         """Bodies of the jaw's two fingers: the pad and the rest of each."""
-        return [(f"{self.hand}finger_joint{i}_tip", f"{self.hand}{side}finger") for i, side in ((1, "left"), (2, "right"))]
+        return [
+            (f"{self.hand}finger_joint{i}_tip", f"{self.hand}{side}finger") for i, side in ((1, "left"), (2, "right"))
+        ]
 
     @property
     def cup_pads(self) -> str:
