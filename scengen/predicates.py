@@ -44,6 +44,12 @@ def held(world: World, body: str) -> bool:
     return world.touching(ROBOT, body) and not any(others)
 
 
+def borne(world: World, arm: Arm, body: str) -> bool:
+    """Whether an arm grips a body that nothing else touches, the other arm neither."""
+    others = (other for other in (*world.arms, *world.partners) if other is not arm)
+    return arm.grips(body) and held(world, body) and not any(world.touching(other.label, body) for other in others)
+
+
 def rests_on(world: World, body: str, support: str) -> bool:
     """Whether a body touches `support`, and neither the robot nor anything else."""
     return world.touching(body, support) and world.touching_bodies(body) == {support}

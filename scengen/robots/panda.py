@@ -148,6 +148,18 @@ class Names:
         return f"{self.hand}suction"
 
     @property
+    def finger_bodies(self) -> list[tuple[str, str]]:
+        """Bodies of the jaw's two fingers: the pad and the rest of each."""
+        return [
+            (f"{self.hand}finger_joint{i}_tip", f"{self.hand}{side}finger") for i, side in ((1, "left"), (2, "right"))
+        ]
+
+    @property
+    def cup_pads(self) -> str:
+        """Body of a suction cup's four pads."""
+        return f"{self.hand}suction_pad"
+
+    @property
     def first_pad(self) -> str:
         """First of a suction cup's four pads."""
         return f"{self.hand}pad0_collision"

@@ -91,6 +91,21 @@ class Arm:
         """Whether the suction cup pulled at the last physics step: it was switched on, and its lip was closed."""
         return bool(self.data.ctrl[self._cup] > 0.0)
 
+    def grips(self, body: str) -> bool:
+        """Whether both fingers touch a body, at least one with its pad, or the suction cup that touches it pulls.
+
+        A body that droops leaves one pad and leans on the face of the finger below it.
+        """
+        if self.suction:
+            return self.sealed and self.world.touching(Names(self.number).cup_pads, body)
+        pads, rest = zip(*self._touches(body), strict=True)
+        return any(pads) and all(pad or other for pad, other in zip(pads, rest, strict=True))
+
+    def _touches(self, body: str) -> list[tuple[bool, ...]]:
+        """Whether the pad and the rest of each finger touch a body."""
+        touching, fingers = self.world.touching, Names(self.number).finger_bodies
+        return [tuple(touching(part, body) for part in finger) for finger in fingers]
+
     @property
     def idle(self) -> NDArray[np.float64]:
         """Action without motion that keeps the gripper command, shape (7,)."""

@@ -37,6 +37,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.stool import Stool
 from ..decisions import Decision, choice, side_of, span
 from ..geometry import UP, Mat3, Vec3, about_z, shortest, spoken
+from ..means import Mean, throughout, when
 from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.jaw import FINGER_ACROSS
@@ -110,13 +111,35 @@ class BallCageEscape(Scenario):
             return "the ball fell off the table"
         if fallen(world, "cage", below=0.0):
             return "the cage fell off the table"
-        at = world.rot("cage").T @ (world.pos("ball") - world.pos("cage"))
+        at = self.in_cage(world)
         if self.cage.passes(at, self.ball.radius):
             if not world.touching(ROBOT, "cage") or not world.touching_bodies("cage") <= {ROBOT, "ball"}:
                 return Strict("the ball left a cage that was not lifted")
             if self.lean(world) < self.rolling_tilt + SHAKE_TILT:
                 return Strict("the ball was shaken out of the cage")
         return Strict("the ball rolled to the end without the hole") if self.at_wrong_end(at) else None
+
+    def means(self) -> Mapping[str, Mean]:
+        def leaves(world: World) -> bool:
+            return self.cage.passes(self.in_cage(world), self.ball.radius)
+
+        def lifted(world: World) -> bool:
+            return world.arm.grips("cage") and world.touching_bodies("cage") <= {ROBOT, "ball"}
+
+        return {
+            "the jaw held the cage in the air as the ball left it": when(leaves, lifted),
+            "the cage was tilted to the hole, farther than the ball needs to roll": when(
+                leaves, lambda world: self.lean(world) >= self.rolling_tilt + SHAKE_TILT
+            ),
+            "the ball did not roll to the other end": throughout(
+                lambda world: not self.at_wrong_end(self.in_cage(world))
+            ),
+            "no hand touched the ball in the cage": when(leaves, lambda world: not world.touched(ROBOT, "ball")),
+        }
+
+    def in_cage(self, world: World) -> Vec3:
+        """Centre of the ball in the axes of the cage [m]."""
+        return world.rot("cage").T @ (world.pos("ball") - world.pos("cage"))
 
     def at_wrong_end(self, at: Vec3) -> bool:
         """Whether a ball in the cage, at a place in its axes, has come to the end on the other side than the hole."""

@@ -46,6 +46,7 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..decisions import Decision, choice, near, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, heading, polar, way_to
+from ..means import Mean, when
 from ..params import param
 from ..robots import jaw
 from ..robots.panda import BASE
@@ -122,6 +123,19 @@ class BounceIntercept(LaunchedBall):
         if first and self.placed.wall_distance(world.com("ball")) < CATCHABLE_DISTANCE:
             return Strict("the robot touched the ball at a wall")
         return None
+
+    def means(self) -> Mapping[str, Mean]:
+        def met(world: World) -> bool:
+            return world.touching(ROBOT, "ball")
+
+        def far(world: World) -> bool:
+            return self.placed.wall_distance(world.com("ball")) >= CATCHABLE_DISTANCE
+
+        return {
+            "a wall threw the ball back first": when(met, lambda world: world.memory["bounces"] > 0.0),
+            "the robot met the ball away from the walls": when(met, far),
+            **super().means(),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

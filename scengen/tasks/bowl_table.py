@@ -43,9 +43,10 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ring_rack import RingRack
 from ..decisions import Decision, near
 from ..geometry import AHEAD, UP, Mat3, Vec3, about_y, about_z, corners, gap, way_to
+from ..means import Mean, once, throughout, when
 from ..params import param
 from ..physics import GRAVITY
-from ..predicates import fallen, over
+from ..predicates import borne, fallen, over
 from ..robots import panda
 from ..robots.jaw import OPENING, TIP_BELOW, droop, pinch
 from ..robots.suction import CUP_HALF_WIDTH, TORQUE
@@ -127,6 +128,35 @@ class BowlTable(Scenario):
             return Strict("the bowl lay on its side or upside down")
         loose = FALL_ANGLE < tilt < TURNED_UP and not self.rim_held(world)
         return Strict("the bowl was turned up without the jaw on its rim") if loose else None
+
+    def means(self) -> Mapping[str, Mean]:
+        pulled, shared = (
+            "suction alone pulled the bowl out of the rack",
+            "the jaw gripped the bowl while suction pulled",
+        )
+
+        def fell(world: World) -> bool:
+            touched, tilt = world.touching_bodies("bowl") - {ROBOT}, world.tilt("bowl")
+            stored = touched == {"rack"} and tilt > math.pi - FALL_ANGLE
+            askew = bool(touched) and tilt > FALL_ANGLE and not stored
+            return askew or world.velocity("bowl")[5] < -MAX_FALL_SPEED
+
+        def pinched(world: World) -> bool:
+            return world.arms[1].grips("bowl") and world.arms[1].gap < self.bowl.bead + RIM_REACH
+
+        return {
+            pulled: once(lambda w: w.tilt("bowl") > math.pi - FALL_ANGLE and borne(w, w.arms[0], "bowl")),
+            shared: once(
+                lambda w: w.arms[0].grips("bowl") and pinched(w) and w.touching_bodies("bowl") == {ROBOT}, after=pulled
+            ),
+            "the jaw alone turned the bowl up": throughout(
+                lambda w: not FALL_ANGLE < w.tilt("bowl") < TURNED_UP or (pinched(w) and borne(w, w.arms[1], "bowl"))
+            ),
+            "the jaw set the bowl down upright": when(
+                lambda w: w.tilt("bowl") < FALL_ANGLE and w.touching("bowl", "table"), pinched
+            ),
+            "the bowl neither fell nor touched anything askew": throughout(lambda w: not fell(w)),
+        }
 
     def rim_held(self, world: World) -> bool:
         """Whether the rim is between the closed fingers of the jaw."""

@@ -34,6 +34,7 @@ from ..assets.cracker_box import CrackerBox
 from ..assets.prop import TABLE_TOP
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, axes, gap, way_to
+from ..means import Mean, once, throughout, when
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, seated
@@ -94,6 +95,25 @@ class CrackerBoxJaw(BoxAndSlot):
         """Whether the box stands in the slot, or falls in it, from more than the angle at which it may be let go."""
         steep = abs(world.rot("box")[2, 2]) > math.sin(MAX_RELEASE_ANGLE)
         return steep and world.touching("box", "slot") and not world.touching(ROBOT, "box")
+
+    def means(self) -> Mapping[str, Mean]:
+        let_go = "the jaw let go of a box with one end in the slot"
+        return {
+            "the jaw brought the box to the slot": when(
+                lambda world: world.touching("box", "slot"), lambda world: world.arm.grips("box")
+            ),
+            "the box was let go at a flat angle": throughout(lambda world: not self.let_go_steep(world)),
+            let_go: once(self.left_leaning, after="the jaw brought the box to the slot"),
+            "a knock of the robot brought the other end down": once(
+                lambda world: world.touching(ROBOT, "box") and not self.down(world), after=let_go
+            ),
+        }
+
+    def left_leaning(self, world: World) -> bool:
+        """Whether the robot does not touch a box that is partly in the slot, below its walls."""
+        lowest = world.com("box")[2] - float(np.abs(world.rot("box")[2]) @ self.box.size) / 2
+        free = world.touching("box", "slot") and not world.touching(ROBOT, "box")
+        return free and lowest < self.rim and not self.down(world)
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -34,9 +34,10 @@ import numpy as np
 from ..assets.cracker_box import CrackerBox
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, axes, gap, shortest, way_to
+from ..means import Mean, once, throughout, when
 from ..params import param
 from ..physics import GRAVITY
-from ..predicates import fallen, seated
+from ..predicates import borne, fallen, seated
 from ..robots.suction import CUP_HALF_WIDTH, PULL, TORQUE
 from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT, Arm
@@ -96,14 +97,41 @@ class CrackerBoxSuction(BoxAndSlot):
         """Whether the box rests, let go, where it neither stands nor lies in the slot."""
         if world.tilt("box") < LEANING or world.touching(ROBOT, "box") or not world.touching_bodies("box"):
             return False
+        return self.fall_speed(world) < REST_SPEED and not self.in_slot(world)
+
+    def in_slot(self, world: World) -> bool:
+        """Whether the box is near its seat."""
         off, (aside, high) = world.com("box") - self.seat, SEATED
-        return self.fall_speed(world) < REST_SPEED and (math.hypot(off[0], off[1]) > aside or abs(off[2]) > high)
+        return math.hypot(off[0], off[1]) <= aside and abs(off[2]) <= high
 
     def fall_speed(self, world: World) -> float:
         """Speed of the box' fastest corner on its way down [m/s]."""
         velocity, rot = world.velocity("box"), world.rot("box")
         turning = velocity[0] * rot[1] - velocity[1] * rot[0]  # z of the turn's velocity at the tip of each axis
         return float(np.abs(turning) @ self.box.size / 2 - velocity[5])
+
+    def means(self) -> Mapping[str, Mean]:
+        def leans(world: World) -> bool:
+            return world.tilt("box") >= LEANING
+
+        return {
+            "the box did not fall": throughout(lambda world: self.fall_speed(world) <= MAX_FALL_SPEED),
+            "the cup lifted the upright box by a broad face": once(
+                lambda world: not leans(world) and borne(world, world.arm, "box") and self.by_broad_face(world)
+            ),
+            "the cup on a broad face laid the box down": throughout(
+                lambda world: not leans(world) or self.in_slot(world) or self.by_broad_face(world)
+            ),
+            "the cup still pulled when the box was down": when(
+                lambda world: leans(world) and abs(world.com("box")[2] - self.seat[2]) < HEIGHT_TOLERANCE,
+                lambda world: world.arm.grips("box"),
+            ),
+        }
+
+    def by_broad_face(self, world: World) -> bool:
+        """Whether the cup pulls at a broad face of the box."""
+        facing_it = abs(world.arm.hand_rot[:, 2] @ world.rot("box")[:, 0]) > math.cos(LEANING)
+        return facing_it and world.arm.grips("box")
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -52,12 +52,14 @@ from ..assets.prop import TABLE_HALF, TABLE_TOP, aim, place, place_in_hand, soli
 from ..control.loop import Loop
 from ..decisions import Decision, around, choice, side_of
 from ..geometry import UP, Vec3, about_z, heading, polar, quat, rotation, spoken
+from ..means import Mean, once, throughout
 from ..params import param
 from ..physics import flight
-from ..predicates import seated
+from ..predicates import borne, seated
 from ..robots import jaw
 from ..robots.panda import BASE, REACH
 from ..scenario import Action, Plan, Refutation, Scenario, Shortcut, Strict, require
+from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import release
 from ..skills.motion import CLOSED, COARSE, OPEN, facing_down, go_to, hold, push, turn_to, until, wait
@@ -78,6 +80,9 @@ BREADTH = 0.09  # length of the tray's inner sides across the throw [m]
 RIM_HEIGHT = 0.004  # of the rim on the walls [m]
 RIM_COLOUR = (0.30, 0.30, 0.30, 1.0)
 MAX_BEARING = 75.0  # largest bearing at which throws were measured [deg]
+MIN_THROW_SPEED = 0.2
+"""Least speed outwards of a cube that is thrown [m/s]: swings release it with 0.31 and more, a hand that creeps out to
+full stretch with 0.08."""
 REST_SPEED = 0.02  # speed relative to the tray below which the cube counts as at rest [m/s]
 LANDING_TIME = 2.5  # from the start of the oracle to the landing of the cube, about [s]
 LATEST_LANDING = 3.3  # the same, at the latest [s]
@@ -162,6 +167,23 @@ class CubeToss(Scenario):
     def struck_rim(self, world: World) -> bool:
         """Whether the cube has touched the rim of the tray; the paper has no such rule."""
         return world.touched("cube", "rim")
+
+    def means(self) -> Mapping[str, Mean]:
+        def outwards(world: World) -> bool:
+            away = world.com("cube") - ROBOT_AXIS
+            return float(away[:2] @ world.velocity("cube")[3:5]) > MIN_THROW_SPEED * math.hypot(*away[:2])
+
+        swung = "the jaw swung the cube outwards"
+        return {
+            swung: once(lambda world: borne(world, world.arm, "cube") and outwards(world)),
+            "the cube left the jaw in the swing and flew": once(
+                lambda world: not world.touching_bodies("cube") and outwards(world), after=swung
+            ),
+            "the cube came down inside the tray": throughout(lambda world: not world.touched("cube", "rim")),
+            "the robot did not touch the tray": throughout(
+                lambda world: not any(world.touched(ROBOT, part) for part in ("tray", "rim"))
+            ),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

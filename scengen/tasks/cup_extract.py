@@ -42,12 +42,14 @@ from ..assets.prop import PRIORITY, TABLE_TOP, place, solid, table
 from ..compat import set_multiccd
 from ..decisions import Decision, around, choice, near, span
 from ..geometry import UP, Vec3, about_y, about_z, heading, polar, spoken, way_to
+from ..means import Mean, when
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import OPENING, PALM_ABOVE, PALM_ACROSS, TIP_BELOW, TIP_SPAN_CLOSED, pinch
 from ..robots.panda import BASE
 from ..scenario import Action, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills import motion
 from ..skills.grip import take
@@ -68,6 +70,8 @@ POUR_HEIGHT = 0.16
 """Height above the table at which the hand pours [m]. That leaves 2 cm under the cup: a block that falls 8 cm tumbles
 so chaotically that a nanometre at the start decides where it comes to rest, and a replay outside of this MuJoCo
 misses."""
+MIN_POUR_TILT = math.radians(60.0)
+"""Tilt from which a cup counts as tipped [rad]. A block may be shaken out of a cup that is held level, at 90 deg."""
 MAX_POUR_TILT = math.radians(130.0)  # largest tilt of the cup to which a hand at `POUR_DISTANCE` turns it [rad]
 TURN_RATE = 1.2  # rate at which the cup turns while the block cannot slide yet, and back [rad/s]
 LIFT_HEIGHT = 0.06  # height by which the cup is lifted [m]
@@ -119,6 +123,19 @@ class CupExtract(Scenario):
     def failure(self, world: World) -> str | None:
         lost = fallen(world, "block", "cup")
         return f"the {lost} fell off the table" if lost else None
+
+    def means(self) -> Mapping[str, Mean]:
+        def leaves(world: World) -> bool:
+            return not self.within(world)
+
+        def lifted(world: World) -> bool:
+            return world.arm.grips("cup") and world.touching_bodies("cup") <= {ROBOT, "block"}
+
+        return {
+            "the jaw held the cup in the air as the block left it": when(leaves, lifted),
+            "the cup was tipped as the block left it": when(leaves, lambda world: world.tilt("cup") >= MIN_POUR_TILT),
+            "no hand touched the block in the cup": when(leaves, lambda world: not world.touched(ROBOT, "block")),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

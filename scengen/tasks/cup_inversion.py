@@ -38,9 +38,10 @@ from ..assets.patch import TURNED_OVER, Patch
 from ..assets.prop import TABLE_TOP, place, table
 from ..decisions import Decision, near
 from ..geometry import UP, Mat3, Vec3, between, corners, gap, rotation, shortest, way_to
+from ..means import Mean, once, throughout, when
 from ..params import param
 from ..physics import GRAVITY
-from ..predicates import fallen
+from ..predicates import borne, fallen
 from ..robots import panda
 from ..robots.jaw import OPENING, PALM_ACROSS, TIP_BELOW, droop, pinch
 from ..robots.suction import PULL
@@ -112,6 +113,27 @@ class CupInversion(Scenario):
             return Strict("the cup was dropped")
         askew = FALL_ANGLE < world.tilt("cup") < INVERTED_ANGLE
         return Strict("the cup was knocked over") if askew and world.touching("cup", "table") else None
+
+    def means(self) -> Mapping[str, Mean]:
+        lifted, shared = "suction alone lifted the inverted cup", "the jaw gripped the cup while suction still pulled"
+
+        def askew(world: World) -> bool:
+            return FALL_ANGLE < world.tilt("cup") < INVERTED_ANGLE and world.touching("cup", "table")
+
+        def fell(world: World) -> bool:
+            return world.velocity("cup")[5] < -MAX_FALL_SPEED and not world.touching(ROBOT, "cup")
+
+        return {
+            lifted: once(lambda w: w.tilt("cup") > INVERTED_ANGLE and borne(w, w.arms[0], "cup")),
+            shared: once(
+                lambda w: all(arm.grips("cup") for arm in w.arms) and not w.touching("cup", "table"), after=lifted
+            ),
+            "then the jaw alone bore the cup": once(lambda w: borne(w, w.arms[1], "cup"), after=shared),
+            "the jaw set the cup down upright": when(
+                lambda w: w.tilt("cup") < FALL_ANGLE and w.touching("cup", "table"), lambda w: w.arms[1].grips("cup")
+            ),
+            "the cup neither fell nor touched the table askew": throughout(lambda w: not askew(w) and not fell(w)),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -43,6 +43,7 @@ from ..assets.chain import DECOY, DRIFT, GAP, MISSING, Chain, Defect, Lanes
 from ..assets.prop import TABLE_TOP, place, table
 from ..decisions import Decision, choice
 from ..geometry import UP, Vec3, about_z, heading, spoken
+from ..means import Mean, once, throughout
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS, TIP_BELOW
@@ -119,6 +120,20 @@ class DominoSelect(Scenario):
             return Strict("the robot touched a second chain")
         away = any(carried(world, tile, self.feet[tile], CARRY_TOLERANCE) for tile in touched)
         return Strict("the robot carried the first tile away") if away else None
+
+    def means(self) -> Mapping[str, Mean]:
+        chain = [*(f"tile_{self.intact_lane}_{i}" for i in range(self.count)), "slab"]
+        return {
+            "the robot touched the first tile of the intact chain alone": throughout(
+                lambda world: not touched_only(world, chain[0])
+            ),
+            "that tile fell where it stood": throughout(
+                lambda world: not carried(world, chain[0], self.feet[chain[0]], CARRY_TOLERANCE)
+            ),
+            "each tile of that chain struck the next": once(
+                lambda world: all(world.touched(*pair) for pair in itertools.pairwise(chain))
+            ),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -40,9 +40,10 @@ from ..control.loop import Loop
 from ..decisions import Decision, choice, side_of, span
 from ..errors import GaveUp
 from ..geometry import AHEAD, UP, Mat3, Outline, Vec3, between, corners
+from ..means import Mean, once, when
 from ..params import param
 from ..physics import GRAVITY
-from ..predicates import fallen, held
+from ..predicates import borne, fallen, held
 from ..robots.jaw import OPENING, PAD, TIP_BELOW, pinch, time_to_grip
 from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
@@ -52,6 +53,10 @@ from ..skills.motion import CLOSED, COARSE, FINE, OPEN, STEADY, Pace, facing_dow
 MIN_LIFT = 0.05
 """Height of the plate's lowest corner above the table top at which the plate counts as lifted [m]: five times the
 thickest plate in the task file."""
+MIN_LIP = 0.010
+"""Overhang of a plate's farthest corner from which it has a lip [m]; half of the pads is 11 mm wide."""
+LYING_TOLERANCE = math.radians(15.0)
+"""Largest tilt of a plate that lies on the table [rad]: fingers that close on its lip turn it by a few degrees."""
 MIN_OVERHANG = 0.036
 """Least overhang that can be pinched [m]: palm and fingers of that hand reach 12 and 14 mm past the grip site towards
 the table, which leaves 4 mm of clearance beside the edge, and half of the pads is 11 mm wide."""
@@ -96,6 +101,25 @@ class EdgeSlide(Scenario):
 
     def failure(self, world: World) -> str | None:
         return "the plate fell off the table" if fallen(world, "plate") else None
+
+    def means(self) -> Mapping[str, Mean]:
+        def lies_out(world: World) -> bool:
+            reach = np.abs(self.underside(world)[:, :2]).max()
+            flat = world.touching("plate", "table") and abs(world.rot("plate")[2, 2]) > math.cos(LYING_TOLERANCE)
+            return flat and reach > TABLE_HALF + MIN_LIP
+
+        slid = "the plate lay on the table with a lip over its edge"
+        return {
+            slid: once(lies_out),
+            "the jaw gripped the lip of the plate that lay there": when(
+                lambda world: world.arm.grips("plate") and world.arm.gap > self.plate.thickness / 2,
+                lies_out,
+                after=slid,
+            ),
+            "both pads lifted the plate": when(
+                lambda world: self.lowest(world) >= TABLE_TOP + MIN_LIFT, lambda world: borne(world, world.arm, "plate")
+            ),
+        }
 
     def underside(self, world: World) -> Vec3:
         """Present positions of the corners of the plate's underside [m], shape (4, 3)."""

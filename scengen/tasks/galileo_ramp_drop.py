@@ -38,7 +38,9 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ramp import WALL_RISE, WALL_THICKNESS, Ramp
 from ..decisions import Decision, around
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, spoken
+from ..means import Mean, once, throughout, when
 from ..params import param
+from ..predicates import still
 from ..robots import jaw
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
@@ -48,6 +50,11 @@ from ..skills.motion import COARSE, closing_along, retreat, turn_to, wait
 
 TRAY = Bin(width=0.08, length=0.15, depth=0.012, wall=0.005, floor=0.005)
 """Tray of the ball, long enough for the open jaw; its rim holds the ball and is below its equator."""
+MAX_HOP = 0.01  # largest gap between the ramp and a ball that is let go [m]: at its release it hops by 1 to 2 mm
+RELEASE_SPEED = 0.2
+"""Largest speed of a ball that is let go at rest, as it leaves the fingers [m/s]: it slides up to 0.13 m/s fast while they
+open. A push to 0.2 m/s is worth 2 mm of height.
+"""
 CARRY_HEIGHT = 0.12
 """Height above the tray and above the floor of the ramp at which the ball is carried [m]: over rims and walls."""
 
@@ -89,11 +96,39 @@ class GalileoRampDrop(Scenario):
             return Strict("the robot touched the ball beyond the middle of the ramp")
         if touching and world.touched("ball", "ramp/far"):
             return Strict("the ball was touched again after its run")
-        if not touching and self.gap(world.com("ball")) > 0.01:  # at its release a ball hops by 1 to 2 mm
+        if not touching and self.gap(world.com("ball")) > MAX_HOP:
             return Strict("the ball was not let go on the floor of the ramp")
         if along > self.patch_edge:
             return Strict("the ball went past the patch")
         return None
+
+    def means(self) -> Mapping[str, Mean]:
+        held, free = "the jaw held the ball on the near slope", "the ball was let go there at rest"
+
+        def on_slope(world: World) -> bool:
+            return world.arm.grips("ball") and world.touching("ball", "ramp/near")
+
+        def at_rest(world: World) -> bool:
+            on_floor = self.gap(world.com("ball")) <= MAX_HOP
+            return on_floor and self.along(world.com("ball")) < 0.0 and still(world, "ball", RELEASE_SPEED)
+
+        def untouched(world: World) -> bool:
+            return not world.touching(ROBOT, "ball")
+
+        return {
+            held: once(on_slope),
+            free: when(untouched, at_rest, after=held),
+            "no hand touched the ball after that": throughout(untouched, after=free),
+            "the ball came to the patch through the valley": when(
+                lambda world: world.touched("ball", "ramp/patch"), lambda world: world.touched("ball", "ramp/valley")
+            ),
+            "the ball kept to the ramp and turned before the patch's upper edge": throughout(
+                lambda world: (
+                    self.along(world.com("ball")) <= self.patch_edge
+                    and (world.touching(ROBOT, "ball") or self.gap(world.com("ball")) <= MAX_HOP)
+                )
+            ),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -41,6 +41,7 @@ from ..assets.prop import TABLE_HALF, TABLE_TOP, place, table
 from ..control.loop import Loop
 from ..decisions import Decision, around, choice, side_of
 from ..geometry import UP, Vec3, between, heading, quat
+from ..means import Mean, once, throughout, when
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
@@ -116,6 +117,34 @@ class GapFunnel(Scenario):
         if world.touching(ROBOT, "ball") and (world.com("ball") - self.gap_at) @ self.normal > 0.0:
             return Strict("the robot touched the ball behind the wall")
         return Strict("the ball was lifted") if world.com("ball")[2] - self.start[2] > MAX_RISE else None
+
+    def means(self) -> Mapping[str, Mean]:
+        through = "the ball rolled through the gap by itself, on the table"
+
+        def brought(world: World) -> bool:
+            x, y = self.from_gap(world)
+            return world.touching(ROBOT, "ball") and x < 0.0 and abs(y) < self.wall.gap / 2 - self.ball.radius
+
+        def rolls(world: World) -> bool:
+            low = world.com("ball")[2] - self.start[2] <= MAX_RISE
+            return low and not world.touching(ROBOT, "ball") and abs(self.from_gap(world)[1]) < self.wall.gap / 2
+
+        return {
+            "the robot brought the ball before the gap": once(brought),
+            through: when(lambda world: self.from_gap(world)[0] > 0.0, rolls),
+            "no hand touched the ball beyond the gap": throughout(
+                lambda world: not world.touching(ROBOT, "ball"), after=through
+            ),
+            "the ball stayed on the table": throughout(lambda world: world.com("ball")[2] - self.start[2] <= MAX_RISE),
+            "neither ball nor hand felt for the gap along the wall": throughout(
+                lambda world: not world.touched("ball", "wall") and not world.touched(ROBOT, "wall")
+            ),
+        }
+
+    def from_gap(self, world: World) -> tuple[float, float]:
+        """Place of the ball from the middle of the gap, in the direction in which it leads and to the left [m]."""
+        away = world.com("ball") - self.gap_at
+        return float(away @ self.normal), float(away @ self.tangent)
 
     # --- oracle ---------------------------------------------------------------------------
 

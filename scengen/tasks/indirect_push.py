@@ -45,6 +45,7 @@ from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..control.loop import Loop
 from ..decisions import Decision, around, choice
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, between, corners, gap, heading, least_gap
+from ..means import Mean, once, throughout
 from ..params import Bounded, param
 from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
@@ -151,6 +152,19 @@ class IndirectPush(Scenario):
             chain |= beside
             ends += beside
         return False
+
+    def means(self) -> Mapping[str, Mean]:
+        def by_chain(world: World) -> bool:
+            return self._pushed(world) and not self.single_block(world)
+
+        return {
+            "a chain of two or more blocks passed the push on to the target": once(by_chain),
+            "the target moved only as far as the chain pushed it": throughout(
+                lambda world: still(world, "target", MAX_COAST_SPEED) or self._pushed(world)
+            ),
+            "no block touched robot and target at once": throughout(lambda world: not self.single_block(world)),
+            "the robot did not touch the target": throughout(lambda world: not world.touched(ROBOT, "target")),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -44,6 +44,7 @@ from ..assets.words import WORDS
 from ..control.loop import Loop
 from ..decisions import Decision, choice, near
 from ..geometry import UP, Vec3, about_z
+from ..means import Mean, throughout
 from ..params import param
 from ..predicates import KEY_MEMORY, SEVERAL_KEYS, count_time, fallen, key_that_counts, long_enough
 from ..robots import panda
@@ -113,6 +114,12 @@ class KeyboardTyping(Scenario):
         if world.touched("robot0", "robot1"):
             return Strict("the arms touched each other")
         return Strict("the agent let its turn go by") if self.late(world) else None
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "the agent came in each of its turns": throughout(lambda world: not self.late(world)),
+            "the arms kept clear of each other": throughout(lambda world: not world.touched("robot0", "robot1")),
+        }
 
     def events(self, world: World) -> None:
         """Count what is typed, show it, and move the partner."""

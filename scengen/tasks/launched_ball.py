@@ -12,7 +12,7 @@ predicted place, close it as the ball arrives.
 
 import abc
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -22,6 +22,7 @@ from ..assets.enclosure import Way
 from ..assets.prop import TABLE_HALF, TABLE_TOP
 from ..control.loop import Loop
 from ..geometry import UP, Vec3, between
+from ..means import Mean, throughout, when
 from ..predicates import fallen, held
 from ..robots import jaw
 from ..robots.panda import BASE
@@ -52,6 +53,9 @@ DIRECT_TIME = 0.10  # time that the hand needs besides such a straight way [s]
 MIN_CLEARANCE = 0.006  # gap between finger tips and table, and between palm and ball [m]
 WAITING_TOLERANCE = 0.025  # level distance by which a hand that waits may move [m]
 CATCHING_TIME = 0.3  # time from the first touch within which the ball must be between the pads [s]
+ARRIVAL_TIME = 0.1
+"""Time from the first touch within which a jaw that closes as the ball arrives has it between the pads [s]. The oracle
+needs up to 0.07 s. A jaw that starts to close at the touch needs 0.14 s."""
 PAD_TOLERANCE = 0.015  # largest distance of the centre of a ball between the pads from the grip site [m]
 GAP_TOLERANCE = 0.004  # largest difference between the gap of a jaw that holds the ball and the ball's width [m]
 MEMORY = ("place_x", "place_y", "moved", "first_touch", "caught")
@@ -112,6 +116,16 @@ class LaunchedBall(Scenario):
         if not memory["caught"] and world.time - memory["first_touch"] > CATCHING_TIME:
             return Strict("the ball was touched and not caught")
         return None
+
+    def means(self) -> Mapping[str, Mean]:
+        def met(world: World) -> bool:
+            first = world.memory["first_touch"]
+            return first > 0.0 and world.time - first >= ARRIVAL_TIME
+
+        return {
+            "the hand waited for the ball": throughout(lambda world: world.memory["moved"] <= WAITING_TOLERANCE),
+            "the jaw closed as the ball arrived": when(met, lambda world: world.memory["caught"] > 0.0),
+        }
 
     # --- moves ----------------------------------------------------------------------------
 

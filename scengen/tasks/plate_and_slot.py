@@ -26,6 +26,7 @@ from ..control.loop import Loop
 from ..decisions import Decision, choice, near, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, between, corners, shortest
+from ..means import Mean, throughout, when
 from ..predicates import fallen
 from ..robots.jaw import PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan, Scenario, Strict
@@ -117,11 +118,30 @@ class PlateAndSlot(Scenario, Generic[PlateT]):
     def failure(self, world: World) -> str | None:
         if fallen(world, "plate"):
             return "the plate fell off the table"
-        # A rim up to 10 mm higher than that of a plate that lies on the table counts as lying.
-        lies = self.lowest(world) < TABLE_TOP + self.plate.rise + 0.010
-        if lies and float(np.abs(self.middle(world)[:2]).max()) > TABLE_HALF - EDGE_MARGIN - self.plate.radius:
+        if self.lies_at_edge(world):
             return Strict("the plate was pushed to the table's edge")
         return Strict("the plate was dropped") if world.velocity("plate")[5] < -MAX_FALL_SPEED else None
+
+    def lies_at_edge(self, world: World) -> bool:
+        """Whether the plate lies near the table's edge."""
+        # A rim up to 10 mm higher than that of a plate that lies on the table counts as lying.
+        lies = self.lowest(world) < TABLE_TOP + self.plate.rise + 0.010
+        return lies and float(np.abs(self.middle(world)[:2]).max()) > TABLE_HALF - EDGE_MARGIN - self.plate.radius
+
+    def means(self) -> Mapping[str, Mean]:
+        return {
+            "a jaw alone brought the plate to the slot": when(
+                lambda world: world.touching("plate", "shelf"),
+                lambda world: any(self.bears(world, arm) for arm in world.arms if not arm.suction),
+            ),
+            "the plate stayed away from the table's edge": throughout(lambda world: not self.lies_at_edge(world)),
+            "the plate did not fall": throughout(lambda world: world.velocity("plate")[5] >= -MAX_FALL_SPEED),
+        }
+
+    def bears(self, world: World, arm: Arm) -> bool:
+        """Whether an arm grips the plate above the table, and the other arm does not touch it."""
+        others = any(world.touching(other.label, "plate") for other in world.arms if other is not arm)
+        return arm.grips("plate") and not others and not world.touching("plate", "table")
 
     # --- attempts with one jaw --------------------------------------------------------------
 

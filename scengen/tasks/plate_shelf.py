@@ -40,8 +40,10 @@ from ..assets.prop import TABLE_TOP
 from ..assets.slot_shelf import SlotShelf
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, corners, gap, way_to
+from ..means import Mean, once
 from ..params import param
 from ..physics import GRAVITY
+from ..predicates import borne
 from ..robots import panda
 from ..robots.jaw import PALM_ABOVE, TIP_BELOW, TIP_SPAN_CLOSED, droop, pinch
 from ..robots.suction import CUP_HALF_WIDTH, TUBE
@@ -83,6 +85,18 @@ class PlateShelf(PlateAndSlot[Plate]):
         # A cup on the lip, which leans, seals under conjugate gradients only, and shortcuts should have every chance.
         scene.option.solver = mujoco.mjtSolver.mjSOL_CG
         return scene
+
+    def means(self) -> Mapping[str, Mean]:
+        lifted, shared = "suction alone lifted the plate", "the jaw gripped the plate while suction still pulled"
+        return {
+            lifted: once(lambda world: borne(world, world.arms[0], "plate")),
+            shared: once(
+                lambda world: all(arm.grips("plate") for arm in world.arms) and not world.touching("plate", "table"),
+                after=lifted,
+            ),
+            "then the jaw alone bore the plate": once(lambda world: borne(world, world.arms[1], "plate"), after=shared),
+            **super().means(),
+        }
 
     # --- oracle ---------------------------------------------------------------------------
 

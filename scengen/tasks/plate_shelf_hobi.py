@@ -41,8 +41,10 @@ from ..assets.prop import TABLE_TOP
 from ..control.loop import Loop
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, between, corners, gap, polar, shortest, way_to
+from ..means import Mean, once, throughout, when
 from ..params import param
 from ..physics import GRAVITY
+from ..predicates import borne
 from ..robots import panda
 from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW, droop, pinch
 from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
@@ -92,6 +94,28 @@ class PlateShelfHobi(PlateAndSlot[Dish]):
         if knocked:
             return Strict("the plate knocked against the shelf")
         return Strict("the plate was raised without being pressed") if self.raised_unpressed(world) else None
+
+    def means(self) -> Mapping[str, Mean]:
+        shared = "one jaw gripped the raised rim while the other hand pressed"
+
+        def leans(world: World) -> bool:
+            return world.touching("plate", "table") and world.tilt("plate") > PRESSED_SHARE * self.plate.slope
+
+        def both(world: World) -> bool:
+            return all(world.touching(arm.label, "plate") for arm in world.arms)
+
+        return {
+            "one hand had pressed the plate down before the other hand touched it": when(both, leans),
+            "no hand raised the plate unpressed": throughout(lambda world: not self.raised_unpressed(world)),
+            shared: once(lambda world: both(world) and leans(world) and any(a.grips("plate") for a in world.arms)),
+            "then that jaw alone bore the plate": once(
+                lambda world: any(borne(world, arm, "plate") for arm in world.arms), after=shared
+            ),
+            "the plate touched the shelf on edge only": throughout(
+                lambda world: not world.touching("plate", "shelf") or self.over_slot(world)
+            ),
+            **super().means(),
+        }
 
     def raised_unpressed(self, world: World) -> bool:
         """Whether a hand raises the plate before another hand has turned it by pressing the opposite side."""
