@@ -52,9 +52,8 @@ TRAY = Bin(width=0.08, length=0.15, depth=0.012, wall=0.005, floor=0.005)
 """Tray of the ball, long enough for the open jaw; its rim holds the ball and is below its equator."""
 MAX_HOP = 0.01  # largest gap between the ramp and a ball that is let go [m]: at its release it hops by 1 to 2 mm
 RELEASE_SPEED = 0.2
-"""Largest speed of a ball that is let go at rest, as it leaves the fingers [m/s]: it slides up to 0.13 m/s fast while they
-open. A push to 0.2 m/s is worth 2 mm of height.
-"""
+"""Largest speed of a ball that is let go at rest, as it leaves the fingers [m/s]: as they open it slides at up to 0.13
+m/s. A push to 0.2 m/s is worth 2 mm of height."""
 CARRY_HEIGHT = 0.12
 """Height above the tray and above the floor of the ramp at which the ball is carried [m]: over rims and walls."""
 

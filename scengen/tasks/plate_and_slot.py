@@ -130,8 +130,8 @@ class PlateAndSlot(Scenario, Generic[PlateT]):
 
     def means(self) -> Mapping[str, Mean]:
         return {
-            "a jaw alone brought the plate to the slot": when(
-                lambda world: world.touching("plate", "shelf"),
+            "a jaw alone lowered the plate in the slot": when(
+                lambda world: self.on_edge(world) and self.in_slot(world),
                 lambda world: any(self.bears(world, arm) for arm in world.arms if not arm.suction),
             ),
             "the plate stayed away from the table's edge": throughout(lambda world: not self.lies_at_edge(world)),

@@ -40,7 +40,7 @@ from ..assets.prop import TABLE_TOP
 from ..assets.slot_shelf import SlotShelf
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, corners, gap, way_to
-from ..means import Mean, once
+from ..means import Mean, once, when
 from ..params import param
 from ..physics import GRAVITY
 from ..predicates import borne
@@ -87,14 +87,21 @@ class PlateShelf(PlateAndSlot[Plate]):
         return scene
 
     def means(self) -> Mapping[str, Mean]:
-        lifted, shared = "suction alone lifted the plate", "the jaw gripped the plate while suction still pulled"
+        lifted, shared = "suction alone lifted the plate", "the jaw touched the plate while suction pulled"
+        right, left = 0, 1
+
+        def handed(world: World) -> bool:
+            return world.arms[left].grips("plate") and not world.touching("plate", "table")
+
         return {
-            lifted: once(lambda world: borne(world, world.arms[0], "plate")),
+            lifted: once(lambda world: borne(world, world.arms[right], "plate")),
             shared: once(
-                lambda world: all(arm.grips("plate") for arm in world.arms) and not world.touching("plate", "table"),
+                lambda world: world.arms[right].grips("plate") and world.touching(world.arms[left].label, "plate"),
                 after=lifted,
             ),
-            "then the jaw alone bore the plate": once(lambda world: borne(world, world.arms[1], "plate"), after=shared),
+            "the jaw gripped the plate in the air as suction let go": when(
+                lambda world: not world.arms[right].grips("plate"), handed, after=shared
+            ),
             **super().means(),
         }
 

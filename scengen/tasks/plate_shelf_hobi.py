@@ -96,21 +96,26 @@ class PlateShelfHobi(PlateAndSlot[Dish]):
         return Strict("the plate was raised without being pressed") if self.raised_unpressed(world) else None
 
     def means(self) -> Mapping[str, Mean]:
-        shared = "one jaw gripped the raised rim while the other hand pressed"
+        pressed, held = (
+            "one hand had pressed the plate down when the other hand touched it",
+            "a jaw gripped the rim before it fell back",
+        )
 
         def leans(world: World) -> bool:
             return world.touching("plate", "table") and world.tilt("plate") > PRESSED_SHARE * self.plate.slope
 
-        def both(world: World) -> bool:
-            return all(world.touching(arm.label, "plate") for arm in world.arms)
+        def gripped(world: World) -> bool:
+            return any(arm.grips("plate") for arm in world.arms)
 
         return {
-            "one hand had pressed the plate down before the other hand touched it": when(both, leans),
-            "no hand raised the plate unpressed": throughout(lambda world: not self.raised_unpressed(world)),
-            shared: once(lambda world: both(world) and leans(world) and any(a.grips("plate") for a in world.arms)),
-            "then that jaw alone bore the plate": once(
-                lambda world: any(borne(world, arm, "plate") for arm in world.arms), after=shared
+            pressed: when(lambda world: all(world.touching(arm.label, "plate") for arm in world.arms), leans),
+            held: when(
+                lambda world: gripped(world) or not leans(world), lambda w: gripped(w) and leans(w), after=pressed
             ),
+            "then that jaw alone bore the plate": once(
+                lambda world: any(borne(world, arm, "plate") for arm in world.arms), after=held
+            ),
+            "no hand raised the plate unpressed": throughout(lambda world: not self.raised_unpressed(world)),
             "the plate touched the shelf on edge only": throughout(
                 lambda world: not world.touching("plate", "shelf") or self.over_slot(world)
             ),
