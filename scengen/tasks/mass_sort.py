@@ -37,7 +37,7 @@ from ..decisions import Decision, choice
 from ..geometry import UP, Outline, Vec3, corners, gap, least_gap
 from ..means import Mean, when
 from ..params import Bounded, param
-from ..predicates import fallen, held, rests_on, still
+from ..predicates import borne, fallen, held, rests_on, still
 from ..robots.jaw import OPEN_GAP, SPAN
 from ..scenario import (
     Action,
@@ -47,6 +47,7 @@ from ..scenario import (
     Refutation,
     Scenario,
     Shortcut,
+    Strict,
     on_table,
     require,
     within_reach,
@@ -127,14 +128,25 @@ class MassSort(Scenario):
         zones = {cube: self.zone_of(world, cube) for cube in self.cubes}
         if any(zones[cube] not in (None, rank) for cube, rank in self.belongs(world).items()):
             return "a cube was put into a wrong zone"
-        return "a cube fell off the table" if fallen(world, *self.cubes) else None
+        if fallen(world, *self.cubes):
+            return "a cube fell off the table"
+        early = any(zone is not None for zone in zones.values()) and not self.probed(world)
+        return Strict("a cube was put into a zone before each had been lifted") if early else None
 
     def means(self) -> Mapping[str, Mean]:
-        return {
-            "each cube was weighed in the hand before one was let go in a zone": when(
-                lambda world: any(self.zone_of(world, cube) is not None for cube in self.cubes), self.probed
+        def released(world: World) -> bool:
+            return any(self.zone_of(world, cube) is not None for cube in self.cubes)
+
+        def comes(world: World, cube: str) -> bool:
+            return any(self.within(world, cube, rank) for rank in range(CUBE_COUNT))
+
+        carried = {
+            f"the jaw carried the {place} cube into its zone": when(
+                partial(comes, cube=cube), lambda world, cube=cube: borne(world, world.arm, cube)
             )
+            for place, cube in zip(PLACES, self.cubes, strict=True)
         }
+        return {"each cube hung in the hand before one was put into a zone": when(released, self.probed), **carried}
 
     def events(self, world: World) -> None:
         """Notice which cubes have been lifted."""

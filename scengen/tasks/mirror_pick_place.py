@@ -46,9 +46,10 @@ from ..means import Mean, when
 from ..orientation import UPRIGHT, VIEW_CENTRE, Orientation
 from ..params import param
 from ..physics import GRAVITY
-from ..predicates import displaced, fallen, held
+from ..predicates import borne, fallen, held
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, TIP_BELOW, pinch
 from ..scenario import Action, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import grasp, pick
 from ..skills.motion import COARSE, FINE, OPEN, closing_along, facing_down, go_to, retreat, steer
@@ -58,8 +59,6 @@ LIFT_HEIGHT = 0.04
 MIN_PICTURE_OFFSET = 0.12
 """Least distance between the cube and where the picture shows it [m]: the open jaw reaches 66 mm to either side of the
 hand and half a diagonal of the cube is 42 mm, so that a hand that goes there does not even touch the cube."""
-MAX_SHIFT = 0.02
-"""Distance by which closing fingers may move the cube [m]; a palm that sweeps the table moves it farther."""
 APPROACH_HEIGHT = 0.10  # height above the grasp from which the hand comes down [m]
 VIEWS = (UPRIGHT, Orientation(2), Orientation(0, True), Orientation(2, True), Orientation(1))
 """Orientations by `view`: upright, turned by 180 deg, left and right exchanged, above and below exchanged, a quarter
@@ -101,11 +100,23 @@ class MirrorPickPlace(Scenario):
         return "the cube fell off the table" if fallen(world, "cube") else None
 
     def means(self) -> Mapping[str, Mean]:
+        def between(world: World) -> bool:
+            at = world.arm.hand_rot.T @ (world.com("cube") - world.arm.hand)
+            before_palm = at[2] > -self.cube.size[2] / 2  # a palm that sweeps the table meets a cube nearer to itself
+            return bool(abs(at[0]) < world.arm.gap / 2 and abs(at[1]) < self.cube.edge / 2 and before_palm)
+
         return {
-            "the jaw closed on the cube where it lay": when(
-                lambda world: held(world, "cube"), lambda world: displaced(world, "cube", self.spot) < MAX_SHIFT
-            )
+            "the cube stood between the fingers when the robot first touched it": when(
+                lambda world: world.touching(ROBOT, "cube"), between
+            ),
+            "both pads bore the cube as it came up": when(
+                lambda world: self._raised(world) >= LIFT_HEIGHT, lambda world: borne(world, world.arm, "cube")
+            ),
         }
+
+    def _raised(self, world: World) -> float:
+        """Height of the cube's centre above its height on the table [m]."""
+        return world.com("cube")[2] - TABLE_TOP - self.cube.size[2] / 2
 
     # --- oracle ---------------------------------------------------------------------------
 

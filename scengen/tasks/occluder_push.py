@@ -42,9 +42,9 @@ from ..decisions import Decision, choice, near
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap, least_gap
 from ..means import Mean, throughout, when
 from ..params import Bounded, param
-from ..predicates import displaced, fallen, over, rests_on, still
+from ..predicates import borne, fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import grasp, pick, poke, put, release
@@ -123,23 +123,36 @@ class OccluderPush(Scenario):
 
     def failure(self, world: World) -> str | None:
         red = self.cubes[self.reddest(world)]
-        return "the red cube fell off the table" if fallen(world, red) else None
+        if fallen(world, red):
+            return "the red cube fell off the table"
+        for cube in self.cubes:
+            let_go = world.touching(cube, "table") and not world.touching(ROBOT, cube)
+            if cube != red and let_go and self.on_patch(world, cube):
+                return Strict("another cube was put on the patch")
+        return None
 
     def means(self) -> Mapping[str, Mean]:
-        red = self.cubes[self.red]
-        lids = {f"lid_{self.red}_{k}" for k in range(self.lids)}
-        return {
-            "the red cube was uncovered before it was moved": when(
-                lambda world: world.touching(ROBOT, red) and displaced(world, red, self.foot(self.red)) > 0.01,
-                lambda world: not lids & world.touching_bodies(red),
-            ),
-            "no other cube was let go on the patch": throughout(lambda world: not self.mistaken(world)),
-        }
+        def red(world: World) -> str:
+            return self.cubes[self.reddest(world)]
 
-    def mistaken(self, world: World) -> bool:
-        """Whether a cube that is not red lies on the patch without the robot."""
-        lying = (cube for cube in self.cubes if world.touching(cube, "table") and not world.touching(ROBOT, cube))
-        return any(self.on_patch(world, cube) for cube in lying if cube != self.cubes[self.reddest(world)])
+        def open_above(world: World) -> bool:
+            i, reach = self.reddest(world), (self.lid.width + self.cube.edge) / 2
+            lids = (world.com(f"lid_{i}_{k}") - world.com(self.cubes[i]) for k in range(self.lids))
+            return all(math.hypot(away[0], away[1]) > reach for away in lids)
+
+        def strays(world: World) -> bool:
+            others = (cube for cube in self.cubes if cube != red(world))
+            return any(world.touching(cube, "table") and self.on_patch(world, cube) for cube in others)
+
+        return {
+            "the red cube lay uncovered when the jaw gripped it": when(
+                lambda world: world.arm.grips(red(world)), open_above
+            ),
+            "the jaw carried the red cube to the patch": when(
+                lambda world: self.on_patch(world, red(world)), lambda world: borne(world, world.arm, red(world))
+            ),
+            "no other cube came onto the patch": throughout(lambda world: not strays(world)),
+        }
 
     def reddest(self, world: World) -> int:
         """Index of the red cube, by its colour in the scene."""

@@ -47,12 +47,12 @@ from ..assets.prop import TABLE_TOP, Rgba, place, table
 from ..decisions import Decision, around, choice, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, corners, least_gap, way_to, yaw_of
-from ..means import Mean, once, throughout
+from ..means import Mean, throughout
 from ..params import Bounded, param
 from ..physics import GRAVITY
 from ..predicates import fallen, inside, off_first_pose, remember_first_pose
 from ..robots.suction import CUP_HALF_WIDTH, PULL
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.memory import remember
 from ..sim.world import World
@@ -136,15 +136,25 @@ class Packing(Scenario):
         return inside(world, name, "bin", low, high) and world.tilt(name) < FLAT_TOLERANCE
 
     def failure(self, world: World) -> str | None:
-        return "a piece fell off the table" if fallen(world, *world.free_bodies) else None
+        if fallen(world, *world.free_bodies):
+            return "a piece fell off the table"
+        moved = any(self._elsewhere(world, i) for i in range(self.count))
+        return Strict("a piece was tried in a second place") if moved else None
 
     def means(self) -> Mapping[str, Mean]:
+        numbers = range(self.count)
+
+        def carried(world: World, i: int) -> bool:
+            away = world.rot("bin").T @ (world.pos(f"piece_{i}") - world.pos("bin"))
+            over = abs(away[0]) < self.bin.width / 2 and abs(away[1]) < self.bin.length / 2
+            return not over or away[2] < self.bin.floor + self.bin.depth or world.arm.grips(f"piece_{i}")
+
         return {
-            "each piece stayed where it first went in": throughout(
-                lambda world: not any(self._elsewhere(world, i) for i in range(self.count))
+            "suction held each piece until it was down in the bin": throughout(
+                lambda world: all(carried(world, i) for i in numbers)
             ),
-            "the cup brought each piece": once(
-                lambda world: all(world.touched(ROBOT, piece) for piece in world.free_bodies)
+            "no piece was tried in a second place": throughout(
+                lambda world: not any(self._elsewhere(world, i) for i in numbers)
             ),
         }
 

@@ -37,9 +37,9 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ycb import Ycb
 from ..decisions import Decision, choice, near
 from ..geometry import UP, Vec3, heading, way_to
-from ..means import Mean, once
+from ..means import Mean, throughout, when
 from ..params import param
-from ..predicates import fallen, held, over, rests_on, still
+from ..predicates import borne, fallen, held, over, rests_on, still
 from ..robots.panda import BASE
 from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.memory import remember
@@ -117,10 +117,24 @@ class PickPlaceYcb(Scenario):
         return "the thing fell off the table" if fallen(world, "thing") else None
 
     def means(self) -> Mapping[str, Mean]:
+        def near(world: World) -> bool:
+            spot = self.spots[int(world.memory["jumps"])]
+            return math.dist(world.com("thing")[:2], spot[:2]) <= self.near
+
+        def comes(world: World) -> bool:
+            locked = world.memory["jumps"] == self.jumps
+            return locked and over(world, "thing", world.pos("patch"), self.patch.size / 2)
+
         return {
-            "the thing was in the hand when the square had come to rest": once(
-                lambda world: world.memory["jumps"] == self.jumps and held(world, "thing")
-            )
+            "the jaw bore the thing whenever the square jumped": throughout(
+                lambda world: world.memory["jumps"] == self.jumps or not near(world) or borne(world, world.arm, "thing")
+            ),
+            "the jaw bore the thing over the locked square": when(
+                comes, lambda world: borne(world, world.arm, "thing")
+            ),
+            "the jaw set the thing down there": when(
+                lambda world: comes(world) and world.touching("thing", "table"), lambda world: world.arm.grips("thing")
+            ),
         }
 
     def events(self, world: World) -> None:

@@ -25,7 +25,7 @@ Decisions, where the paper (App. B, T16) is silent:
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -43,8 +43,9 @@ from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
 from ..means import Mean, throughout
 from ..params import param
 from ..physics import GRAVITY
+from ..predicates import still
 from ..robots.jaw import FINGER_ACROSS, PALM_ACROSS, PALM_ALONG, TIP_BELOW
-from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import pick, release
@@ -67,6 +68,8 @@ BARRIER_START = 0.04  # distance from the middle of the ramp to the start of the
 TOP_DISTANCE = 0.028  # distance from the high end of the ramp at which balls are released [m]
 CARRY_HEIGHT = 0.19  # height over the table at which balls are carried [m]
 RELEASE_HEIGHT = 0.012  # height over the ramp from which balls are lowered [m]
+MAX_FLIGHT_SPEED = 0.3
+"""Largest speed of a ball in the air over the upper half of the ramp [m/s]: as of a fall from 5 mm."""
 LOWER_PACE = Pace(0.25, 0.004)  # pace down to a ball or to the ramp
 
 
@@ -148,17 +151,38 @@ class RampSort(Scenario):
                 return "a ball is in the bin of the other colour"
             if world.touched(ball, "table") or world.com(ball)[2] < TABLE_TOP:
                 return "a ball is on the table or on the floor"
+        for i in range(len(self.colours)):
+            if self.arrived(world, i) and not world.touched(f"ball_{i}", "ramp"):
+                return Strict("a ball came into its bin without the ramp")
+            if self.high_over_ramp(world, i):
+                return Strict("a ball was carried over the ramp or the bins")
         return None
 
     def means(self) -> Mapping[str, Mean]:
-        balls = range(len(self.colours))
+        def each(holds: Callable[[World, int, float, float], bool]) -> Mean:
+            def hold(world: World) -> bool:
+                places = ((world.com(f"ball_{i}") - self.middle) @ self.axes for i in range(len(self.colours)))
+                return all(holds(world, i, along, across) for i, (along, across, _) in enumerate(places))
+
+            return throughout(hold)
+
+        def own_side(world: World, i: int, along: float, across: float) -> bool:
+            side = self._red_side(world) if self.colours[i] else -self._red_side(world)
+            return side * (across - self.ramp.ridge) > 0.0 or "ramp" not in world.touching_bodies(f"ball_{i}")
+
+        def laid(world: World, i: int, along: float, across: float) -> bool:
+            over = abs(along) < self.ramp.length / 2 and along < BARRIER_START and abs(across) < self._half_width
+            return not over or bool(world.touching_bodies(f"ball_{i}")) or still(world, f"ball_{i}", MAX_FLIGHT_SPEED)
+
+        def rolls(world: World, i: int, along: float, across: float) -> bool:
+            carried = self.high_over_ramp(world, i) or world.touching(ROBOT, f"ball_{i}")
+            past = along > BARRIER_START and abs(across) < self._half_width + self.ball.radius
+            return not (past and carried) and (not self.arrived(world, i) or world.touched(f"ball_{i}", "ramp"))
+
         return {
-            "each ball rolled over the ramp into its bin": throughout(
-                lambda world: all(world.touched(f"ball_{i}", "ramp") for i in balls if self.arrived(world, i))
-            ),
-            "no ball was carried over the ramp or the bins": throughout(
-                lambda world: not any(self.high_over_ramp(world, i) for i in balls)
-            ),
+            "each ball touched the ramp on the side of its colour alone": each(own_side),
+            "no ball was thrown or dropped onto the ramp": each(laid),
+            "each ball came over the lower half of the ramp by itself": each(rolls),
         }
 
     def arrived(self, world: World, i: int) -> int:

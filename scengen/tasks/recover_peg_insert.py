@@ -48,11 +48,12 @@ from ..assets.prop import TABLE_TOP, place, servo, table
 from ..assets.slot_board import PLATE_THICKNESS, STIFFNESS, SlotBoard
 from ..decisions import Decision, around, choice, near, side_of
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap, heading, polar, way_to
-from ..means import Mean, throughout
+from ..means import Mean, throughout, when
 from ..params import param
 from ..predicates import fallen
 from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW
 from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..sim.arm import ROBOT
 from ..sim.memory import remember
 from ..sim.world import World
 from ..skills import insertion
@@ -68,7 +69,6 @@ TURN_MARGIN = math.radians(3.0)  # angle by which the turn exceeds the steepest 
 INSERTED_SHARE = 0.95  # share of the peg's length beyond the mouth to which the oracle pushes (paper)
 MIN_INSERTED_SHARE = 0.93  # least such share that counts
 MAX_INSERTED_SHARE = 1.03  # largest such share that counts: a flush peg
-MEETING_TOLERANCE = 0.002  # distance beyond its play in the slot by which a nose is out of line [m]
 GRIP_HEIGHT = 0.024
 """Height above the foot at which the peg is grasped [m]: the level hand's palm is 32 mm below, the table 54 mm."""
 BOARD_CLEARANCE = 0.006  # clearance of the fingers from the board when they release the peg [m]
@@ -123,14 +123,33 @@ class RecoverPegInsert(Scenario):
         return "the peg fell off the table" if fallen(world, "peg") else None
 
     def means(self) -> Mapping[str, Mean]:
-        return {"after the turn the peg met the board in its mouth": throughout(lambda world: not self.tried(world))}
+        turned, room = "the jaw held the whole peg outside when the board turned", self.board.slot - self.peg.width
 
-    def tried(self, world: World) -> bool:
-        """Whether the board has turned, and the peg touches it with its nose before the mouth and out of line."""
-        nose = max(self.ends(world), key=lambda end: end[0])
-        aside = float(np.abs(nose[1:]).max()) > (self.board.slot - self.peg.width) / 2 + MEETING_TOLERANCE
-        outside = nose[0] < PLATE_THICKNESS / 2
-        return bool(world.memory["turned"] and world.touching("peg", "board") and outside and aside)
+        def outside(world: World) -> bool:
+            foot, top = (end[0] for end in self.ends(world))
+            return max(foot, top) < 0.0 or min(foot, top) > self.board.depth
+
+        def before_window(world: World) -> bool:
+            nose = min(self.ends(world), key=lambda end: abs(end[0] - self.board.depth / 2))
+            return bool(np.abs(nose[1:]).max() < room / 2 + self.board.chamfer)
+
+        def feels(world: World) -> bool:
+            by_hand = world.touching(ROBOT, "board") and outside(world)
+            return by_hand or (world.touching("peg", "board") and not before_window(world))
+
+        return {
+            turned: when(
+                lambda world: world.memory["turned"] > 0, lambda world: outside(world) and world.arm.grips("peg")
+            ),
+            "after the turn neither hand nor peg felt for the window": throughout(
+                lambda world: not feels(world), after=turned
+            ),
+            "the jaw led the nose into the window": when(
+                lambda world: not outside(world),
+                lambda world: before_window(world) and world.arm.grips("peg"),
+                after=turned,
+            ),
+        }
 
     def events(self, world: World) -> None:
         """Turn the board once, as soon as the peg is in line."""

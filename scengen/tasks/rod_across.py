@@ -30,13 +30,13 @@ from ..assets.rod import SLUG_EDGE, Rod
 from ..decisions import Decision, around, choice, near, side_of
 from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, gap, shortest, way_to
-from ..means import Mean, once, throughout, when
+from ..means import Mean, once
 from ..params import param
 from ..physics import GRAVITY
-from ..predicates import fallen, rests_on
+from ..predicates import borne, fallen, rests_on, still
 from ..robots.jaw import PAD, pinch
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Action, Answer, Plan, Planner, Refutation, Shortcut, on_table, require, within_reach
+from ..scenario import Action, Answer, Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import let_go, pick, weigh
@@ -44,6 +44,9 @@ from ..skills.motion import COARSE, OPEN, STEADY, Pace, closing_along, facing_do
 from .rod_and_ridge import MAX_TILT, RIDGE, RodAndRidge
 
 CROSSING_TOLERANCE = math.radians(30.0)  # largest angle between the rod and the level normal of the ridge [rad]
+STEADY_TILT = math.radians(6.0)
+"""Largest tilt of a rod on which the jaw opens [rad]. As it comes down, a rod turns in the grip by up to 4.2 deg."""
+REST_SPEED = 0.02  # speed below which a held rod is at rest [m/s]
 MISS_MARGIN = 0.006
 """Least distance beyond the ridge's edge of the centre of mass of a rod that is laid by its middle [m]."""
 LIFT_HEIGHT = 0.10  # height to which the rod is lifted to be weighed [m]
@@ -75,20 +78,17 @@ class RodAcross(RodAndRidge[Rod]):
         return bool(world.tilt("rod") <= MAX_TILT and crossing and rests_on(world, "rod", RIDGE))
 
     def failure(self, world: World) -> str | None:
-        return "the rod fell off the table" if fallen(world, "rod") else None
+        if fallen(world, "rod"):
+            return "the rod fell off the table"
+        let_go = not world.touching(ROBOT, "rod")
+        return Strict("the rod was let go and tipped") if let_go and world.tilt("rod") > MAX_TILT else None
 
     def means(self) -> Mapping[str, Mean]:
-        on_ridge, opened = "the hand laid the rod on the ridge", "the jaw let the rod go there"
-        wide = self.rod.width + 0.002
         return {
-            on_ridge: when(lambda world: world.touching("rod", RIDGE), lambda world: world.touching(ROBOT, "rod")),
-            opened: once(lambda world: world.touching("rod", RIDGE) and world.arm.gap > wide, after=on_ridge),
-            "the jaw did not close on the rod again": throughout(
-                lambda world: world.arm.gap > wide or not world.touching(ROBOT, "rod"), after=opened
+            "the jaw bore the rod at rest in the air": once(
+                lambda world: borne(world, world.arm, "rod") and still(world, "rod", REST_SPEED)
             ),
-            "the rod stayed level when it was let go": throughout(
-                lambda world: world.touching(ROBOT, "rod") or world.tilt("rod") <= MAX_TILT
-            ),
+            **self.release("the rod lay level as the jaw opened", lambda world: world.tilt("rod") < STEADY_TILT),
         }
 
     # --- oracle ---------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """Base of the tasks with a rod and a ridge (T31, T32 and X1): the scene, and where things stand in it."""
 
 import math
+from collections.abc import Mapping
 from typing import Generic, TypeVar
 
 import mujoco
@@ -11,13 +12,21 @@ from ..assets.prop import TABLE_TOP, place, table
 from ..assets.ridge import PLATE_MARGIN, Ridge
 from ..assets.rod import Rod
 from ..geometry import UP, Outline, Vec3, corners, heading
+from ..means import Condition, Mean, throughout, when
 from ..robots.jaw import PALM_ACROSS, PALM_ALONG
 from ..scenario import Scenario
+from ..sim.arm import ROBOT
+from ..sim.world import World
 
 MAX_TILT = math.radians(10.0)
 """Largest tilt of the rod, from the vertical or from the level [rad] (paper, App. B, T31 and T32)."""
 RIDGE = "stand/ridge"
 """Name of the body of the ridge."""
+
+LOOSE_ROOM = 0.0005
+"""Room between an opening jaw and the rod from which the rod may tip [m]. Pads that hold a rod are 0.4 mm closer."""
+SHUT_ROOM = 0.00025  # room below which a jaw that touches the rod holds it again [m]
+MAX_RATTLE_ROOM = 0.008  # room up to which fingers that open touch the rod [m]; up to 4 mm in jittered runs
 
 RodT = TypeVar("RodT", bound=Rod | InlaidRod)
 
@@ -39,6 +48,36 @@ class RodAndRidge(Scenario, Generic[RodT]):
         place(scene, self.ridge, "stand", self.foot, math.radians(self.ridge_yaw), free=False)
         place(scene, self.rod, "rod", self.start, math.radians(self.rod_yaw))
         return scene
+
+    def release(self, steady: str, holds: Condition) -> Mapping[str, Mean]:
+        """Means of a rod that the jaw brings to the ridge and releases there once.
+
+        Args:
+            steady: name of the fact that must be true when the jaw opens on the ridge.
+            holds: that fact.
+        """
+
+        def opens(world: World) -> bool:
+            return world.touching("rod", RIDGE) and self.room(world) > LOOSE_ROOM
+
+        def left_alone(world: World) -> bool:
+            return not world.touching(ROBOT, "rod") or SHUT_ROOM < self.room(world) < MAX_RATTLE_ROOM
+
+        def tipped(world: World) -> bool:
+            return world.tilt("rod") > MAX_TILT and not world.touching(ROBOT, "rod")
+
+        return {
+            "the jaw brought the rod to the ridge": when(
+                lambda world: world.touching("rod", RIDGE), lambda world: world.arm.grips("rod")
+            ),
+            steady: when(opens, holds),
+            "the jaw that had opened left the rod alone": throughout(left_alone, after=steady),
+            "the rod did not tip once let go": throughout(lambda world: not tipped(world)),
+        }
+
+    def room(self, world: World) -> float:
+        """Room between the pads of the jaw beyond the width of the rod [m]."""
+        return world.arm.gap - self.rod.width
 
     @property
     def start(self) -> Vec3:

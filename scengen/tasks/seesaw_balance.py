@@ -42,12 +42,12 @@ from ..assets.seesaw import Seesaw, standing
 from ..decisions import Decision, around, choice, near
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Vec3, about_z, compound, heading, quat, spoken
-from ..means import Mean, once, throughout
+from ..means import Mean, throughout, when
 from ..params import param, with_values
 from ..predicates import fallen
 from ..robots.jaw import PALM_ALONG
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import pick, put
@@ -117,19 +117,24 @@ class SeesawBalance(Scenario):
         )
 
     def failure(self, world: World) -> str | None:
-        return "a block fell off the table" if fallen(world, *world.free_bodies) else None
+        if fallen(world, *world.free_bodies):
+            return "a block fell off the table"
+        others = {ROBOT, *world.free_bodies} - {"target"}
+        if any(world.touched(other, "target") for other in others):
+            return Strict("the target was touched")
+        return Strict("the target fell on the table") if world.touched("target", "table") else None
 
     def means(self) -> Mapping[str, Mean]:
+        def moved(world: World) -> bool:
+            others = {"table", ROBOT, *world.free_bodies} - {"target"}
+            return any(world.touched(other, "target") for other in others)
+
         return {
-            "the target was left alone on the deck": throughout(lambda world: not self.moved(world)),
-            "the hand put the counterweight on the deck": once(
-                lambda world: world.touching(ROBOT, "weight") and world.touching("weight", BEAM)
+            "the target stayed where it stood, untouched": throughout(lambda world: not moved(world)),
+            "the jaw set the counterweight on the deck": when(
+                lambda world: "weight" in world.touching_bodies(BEAM), lambda world: world.arm.grips("weight")
             ),
         }
-
-    def moved(self, world: World) -> bool:
-        """Whether something other than the deck has touched the target."""
-        return any(world.touched(other, "target") for other in (ROBOT, "table", *{*world.free_bodies} - {"target"}))
 
     def along(self, world: World, block: str) -> float:
         """Place of a block along the deck, from the axle [m]."""

@@ -49,12 +49,12 @@ from ..assets.rack import STOREYS, TierRack
 from ..assets.ycb import Ycb
 from ..decisions import Decision, around, choice, near, side_of
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
-from ..means import Mean, once, throughout
+from ..means import Mean, once, throughout, when
 from ..params import param
-from ..predicates import fallen, held, rests_on, still
+from ..predicates import borne, fallen, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..robots.panda import BASE, ROBOTVIEW
-from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import grasp, let_go, pick
@@ -83,6 +83,10 @@ LIFT_HEIGHT = 0.008
 MAX_BESIDE = 0.025
 """Distance beside the hand from which a touched object is felt, not grasped [m]. Fingers that close meet it within
 13 mm."""
+MIN_BETWEEN = 0.010
+"""Least depth of the object's front behind the grip site when the robot first touches it [m]: the oracle comes 21 mm
+deep. The tips of fingers that meet the front are 9 mm before it."""
+MAX_SQUEEZE = 0.001  # largest distance by which pads that hold the object are closer than it is wide [m]
 RELEASE_HEIGHT = 0.072
 """Height of the grip site above the tray's floor at the release [m]: the palm stays 15 mm above the walls."""
 
@@ -136,17 +140,42 @@ class ShelteredGrasp(Scenario):
         return between and rests_on(world, "thing", "tray") and still(world, "thing", 0.02)
 
     def failure(self, world: World) -> str | None:
-        return "the thing fell off the table" if fallen(world, "thing") else None
+        if fallen(world, "thing"):
+            return "the thing fell off the table"
+        if self._sheltered(world) and world.touching(ROBOT, "thing") and self._beside(world) > MAX_BESIDE:
+            return Strict("the thing was felt for in the rack")
+        return None
 
     def means(self) -> Mapping[str, Mean]:
-        return {
-            "the thing was not felt for in the rack": throughout(lambda world: not self.felt(world)),
-            "the jaw carried the thing": once(lambda world: held(world, "thing")),
-        }
+        width, length, _ = self.thing.size
 
-    def felt(self, world: World) -> bool:
-        """Whether the robot touches the object in the rack where a jaw does not grasp it."""
-        return self._sheltered(world) and world.touching(ROBOT, "thing") and self._beside(world) > MAX_BESIDE
+        def between(world: World) -> bool:
+            at = world.arm.hand_rot.T @ (world.com("thing") - world.arm.hand)
+            return bool(abs(at[0]) < world.arm.gap / 2 and at[2] - length / 2 < -MIN_BETWEEN)
+
+        def closed(world: World) -> bool:
+            at = about_z(self.turn).T @ (world.arm.hand - self.foot)
+            in_rack = at[1] > self.rack.mouth and at[2] < self.rack.top
+            return bool(in_rack) and world.arm.gap < width - MAX_SQUEEZE
+
+        def over_tray(world: World) -> bool:
+            away = np.abs(world.com("thing") - self.tray)
+            return bool(away[0] < TRAY.width / 2 and away[1] < TRAY.length / 2)
+
+        return {
+            "the thing was between the fingers when the robot first touched it": when(
+                lambda world: world.touching(ROBOT, "thing"), between
+            ),
+            "the jaw closed in the rack on the thing alone": throughout(
+                lambda world: not closed(world) or world.touching(ROBOT, "thing")
+            ),
+            "the jaw held the thing as it came out of the rack": when(
+                lambda world: not self._sheltered(world), lambda world: world.arm.grips("thing")
+            ),
+            "the jaw bore the thing over the tray": once(
+                lambda world: over_tray(world) and borne(world, world.arm, "thing")
+            ),
+        }
 
     def _sheltered(self, world: World) -> bool:
         """Whether the object's middle is in the rack."""
