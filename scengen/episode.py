@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from .control.loop import Loop
 from .errors import UnknownName, Unstable
 from .means import Watch
-from .scenario import Scenario, Strict
+from .scenario import Scenario
 from .sim.world import World
 
 Outcome = Literal["success", "failure", "timeout", "unstable"]
@@ -90,7 +90,7 @@ class Episode:
         """Judge the past control period: failure takes precedence over success, success over the time limit."""
         if self.outcome is None:
             self._means.update()
-        if self.outcome in (None, "success") and (lost := self._failure()):
+        if self.outcome in (None, "success") and (lost := self.scenario.failure(self.world)):
             self.reason = f"after the goal was reached: {lost}" if self.outcome else lost
             self.outcome = "failure"
         elif self.outcome is None:
@@ -108,10 +108,6 @@ class Episode:
             self.outcome, self.reason = "failure", f"{OTHERWISE}: {self.lacks}"
         else:
             self.outcome = "success"
-
-    def _failure(self) -> str | None:
-        lost = self.scenario.failure(self.world)
-        return None if self.rules == PAPER and isinstance(lost, Strict) else lost
 
     def settled(self) -> tuple[Outcome, str]:
         """The final outcome and its reason, after the time for which a reached goal has to last."""

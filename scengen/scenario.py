@@ -113,11 +113,6 @@ def within_reach(what: str, *points: ArrayLike, base: NDArray[np.float64] = BASE
     return require(away <= REACH, f"{what} is out of reach", distance=away, reach=REACH)
 
 
-class Strict(str):
-    """Reason of a failure by a rule that the paper lacks. Such a rule closes a way around what a task is about.
-    Certificates are made under these rules; under the rules `paper` they do not count."""
-
-
 class Scenario(abc.ABC):
     """Base of every scenario family. A family is a frozen dataclass, and no family derives from another family.
 
@@ -163,10 +158,8 @@ class Scenario(abc.ABC):
         """Whether the goal holds now."""
 
     def failure(self, world: World) -> str | None:
-        """Reason why the episode is lost, or None. A failure ends the episode.
-
-        Reasons of rules that the source of the task lacks are `Strict`. They come last, so that they hide no others.
-        """
+        """Reason why the episode is lost, or None. A failure ends the episode. Rules that the source of the task lacks
+        are `means`."""
         return None
 
     def means(self) -> Mapping[str, Mean]:

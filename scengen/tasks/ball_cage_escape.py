@@ -41,7 +41,7 @@ from ..means import Mean, throughout, when
 from ..params import param
 from ..predicates import fallen, inside, still
 from ..robots.jaw import FINGER_ACROSS
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT, Arm
 from ..sim.world import World
 from ..skills.jaw import pick, poke
@@ -109,15 +109,7 @@ class BallCageEscape(Scenario):
     def failure(self, world: World) -> str | None:
         if fallen(world, "ball", below=0.0):
             return "the ball fell off the table"
-        if fallen(world, "cage", below=0.0):
-            return "the cage fell off the table"
-        at = self.in_cage(world)
-        if self.cage.passes(at, self.ball.radius):
-            if not world.touching(ROBOT, "cage") or not world.touching_bodies("cage") <= {ROBOT, "ball"}:
-                return Strict("the ball left a cage that was not lifted")
-            if self.lean(world) < self.rolling_tilt + SHAKE_TILT:
-                return Strict("the ball was shaken out of the cage")
-        return Strict("the ball rolled to the end without the hole") if self.at_wrong_end(at) else None
+        return "the cage fell off the table" if fallen(world, "cage", below=0.0) else None
 
     def means(self) -> Mapping[str, Mean]:
         def leaves(world: World) -> bool:

@@ -50,7 +50,7 @@ from ..means import Mean, when
 from ..params import param
 from ..robots import jaw
 from ..robots.panda import BASE
-from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require
+from ..scenario import Plan, Refutation, Shortcut, on_table, require
 from ..sim.arm import ROBOT
 from ..sim.memory import remember
 from ..sim.world import World
@@ -113,16 +113,6 @@ class BounceIntercept(LaunchedBall):
     def may_move(self, world: World) -> bool:
         """Whether the ball is at a wall: the hand waits at its place of the last bounce."""
         return world.touching("enclosure", "ball")
-
-    def failure(self, world: World) -> str | None:
-        if lost := super().failure(world):
-            return lost
-        if world.touching(ROBOT, "ball") and not world.memory["bounces"]:
-            return Strict("the robot touched the ball before it was thrown back")
-        first = world.touching(ROBOT, "ball") and not world.memory["first_touch"]
-        if first and self.placed.wall_distance(world.com("ball")) < CATCHABLE_DISTANCE:
-            return Strict("the robot touched the ball at a wall")
-        return None
 
     def means(self) -> Mapping[str, Mean]:
         def met(world: World) -> bool:

@@ -50,7 +50,7 @@ from ..predicates import borne, fallen, over
 from ..robots import panda
 from ..robots.jaw import OPENING, TIP_BELOW, droop, pinch
 from ..robots.suction import CUP_HALF_WIDTH, TORQUE
-from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT, Arm
 from ..sim.world import World
 from ..skills import handover, jaw, motion, suction
@@ -118,16 +118,7 @@ class BowlTable(Scenario):
         return stands and over(world, "bowl", self.goal, self.patch.size / 2 - self.bowl.foot)
 
     def failure(self, world: World) -> str | None:
-        if fallen(world, "bowl"):
-            return "the bowl fell off the table"
-        if world.velocity("bowl")[5] < -MAX_FALL_SPEED:
-            return Strict("the bowl was dropped")
-        touched, tilt = world.touching_bodies("bowl") - {ROBOT}, world.tilt("bowl")
-        stored = touched == {"rack"} and tilt > math.pi - FALL_ANGLE
-        if touched and tilt > FALL_ANGLE and not stored:
-            return Strict("the bowl lay on its side or upside down")
-        loose = FALL_ANGLE < tilt < TURNED_UP and not self.rim_held(world)
-        return Strict("the bowl was turned up without the jaw on its rim") if loose else None
+        return "the bowl fell off the table" if fallen(world, "bowl") else None
 
     def means(self) -> Mapping[str, Mean]:
         pulled, shared = (
@@ -157,12 +148,6 @@ class BowlTable(Scenario):
             ),
             "the bowl neither fell nor touched anything askew": throughout(lambda w: not fell(w)),
         }
-
-    def rim_held(self, world: World) -> bool:
-        """Whether the rim is between the closed fingers of the jaw."""
-        jaw_arm = world.arms[1]
-        away = self.bowl.rim_distance(world.rot("bowl").T @ (jaw_arm.hand - world.pos("bowl")))
-        return away < RIM_REACH and self.bowl.bead / 2 < jaw_arm.gap < self.bowl.bead + RIM_REACH
 
     # --- oracle ---------------------------------------------------------------------------
 

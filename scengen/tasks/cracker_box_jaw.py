@@ -39,7 +39,7 @@ from ..params import param
 from ..physics import GRAVITY
 from ..predicates import fallen, seated
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ALONG, pinch
-from ..scenario import Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT, Arm
 from ..sim.world import World
 from ..skills import jaw
@@ -87,9 +87,7 @@ class CrackerBoxJaw(BoxAndSlot):
         return flat and seated(world, "box", "slot", self.seat, SEAT_TOLERANCE, HEIGHT_TOLERANCE)
 
     def failure(self, world: World) -> str | None:
-        if fallen(world, "box"):
-            return "the box fell off the table"
-        return Strict("the box was let go steeply in the slot") if self.let_go_steep(world) else None
+        return "the box fell off the table" if fallen(world, "box") else None
 
     def let_go_steep(self, world: World) -> bool:
         """Whether the box stands in the slot, or falls in it, from more than the angle at which it may be let go."""

@@ -47,8 +47,7 @@ from ..means import Mean, once, throughout
 from ..params import param
 from ..predicates import carried, displaced, touched_only
 from ..robots.jaw import FINGER_ACROSS, TIP_BELOW
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.arm import ROBOT
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
 from ..skills.jaw import come_beside, pick, poke, step_back
 from ..skills.motion import Condition, go_to, push, retreat, wait
@@ -111,15 +110,6 @@ class DominoSelect(Scenario):
 
     def success(self, world: World) -> bool:
         return displaced(world, "slab", self.feet["slab"]) >= SLAB_DISPLACEMENT
-
-    def failure(self, world: World) -> str | None:
-        firsts = [f"tile_{k}_0" for k in range(LANES)]
-        if touched_only(world, *firsts):
-            return Strict("the robot touched a slab or a tile other than a first one")
-        if len(touched := [tile for tile in firsts if world.touched(ROBOT, tile)]) > 1:
-            return Strict("the robot touched a second chain")
-        away = any(carried(world, tile, self.feet[tile], CARRY_TOLERANCE) for tile in touched)
-        return Strict("the robot carried the first tile away") if away else None
 
     def means(self) -> Mapping[str, Mean]:
         chain = [*(f"tile_{self.intact_lane}_{i}" for i in range(self.count)), "slab"]

@@ -47,7 +47,7 @@ from ..physics import GRAVITY
 from ..predicates import fallen, inside, still
 from ..robots.ik import shortfall
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, PALM_ACROSS, PALM_ALONG, TIP_BELOW
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills import motion
@@ -110,13 +110,7 @@ class GapFunnel(Scenario):
         return within and still(world, "ball", 0.02) and not world.touching(ROBOT, "ball")
 
     def failure(self, world: World) -> str | None:
-        if fallen(world, "ball"):
-            return "the ball fell off the table"
-        if world.touched("ball", "wall"):
-            return Strict("the ball struck the wall")
-        if world.touching(ROBOT, "ball") and (world.com("ball") - self.gap_at) @ self.normal > 0.0:
-            return Strict("the robot touched the ball behind the wall")
-        return Strict("the ball was lifted") if world.com("ball")[2] - self.start[2] > MAX_RISE else None
+        return "the ball fell off the table" if fallen(world, "ball") else None
 
     def means(self) -> Mapping[str, Mean]:
         through = "the ball rolled through the gap by itself, on the table"

@@ -48,7 +48,7 @@ from ..means import Mean, throughout
 from ..params import param
 from ..predicates import KEY_MEMORY, SEVERAL_KEYS, count_time, fallen, key_that_counts, long_enough
 from ..robots import panda
-from ..scenario import Plan, Refutation, Scenario, Shortcut, Strict, require
+from ..scenario import Plan, Refutation, Scenario, Shortcut, require
 from ..sim.arm import Arm
 from ..sim.memory import remember
 from ..sim.world import World
@@ -109,11 +109,7 @@ class KeyboardTyping(Scenario):
     def failure(self, world: World) -> str | None:
         if mistake := MISTAKES[int(world.memory["mistake"])]:
             return mistake
-        if fallen(world, "keyboard"):
-            return "the keyboard fell off the table"
-        if world.touched("robot0", "robot1"):
-            return Strict("the arms touched each other")
-        return Strict("the agent let its turn go by") if self.late(world) else None
+        return "the keyboard fell off the table" if fallen(world, "keyboard") else None
 
     def means(self) -> Mapping[str, Mean]:
         return {

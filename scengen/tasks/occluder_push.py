@@ -44,8 +44,7 @@ from ..means import Mean, throughout, when
 from ..params import Bounded, param
 from ..predicates import borne, fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
-from ..sim.arm import ROBOT
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
 from ..skills.jaw import grasp, pick, poke, put, release
 from ..skills.motion import COARSE, OPEN, STEADY, closing_along, go_to, push, retreat
@@ -122,14 +121,7 @@ class OccluderPush(Scenario):
         return self.on_patch(world, red) and rests_on(world, red, "table") and still(world, red, 0.01)
 
     def failure(self, world: World) -> str | None:
-        red = self.cubes[self.reddest(world)]
-        if fallen(world, red):
-            return "the red cube fell off the table"
-        for cube in self.cubes:
-            let_go = world.touching(cube, "table") and not world.touching(ROBOT, cube)
-            if cube != red and let_go and self.on_patch(world, cube):
-                return Strict("another cube was put on the patch")
-        return None
+        return "the red cube fell off the table" if fallen(world, self.cubes[self.reddest(world)]) else None
 
     def means(self) -> Mapping[str, Mean]:
         def red(world: World) -> str:

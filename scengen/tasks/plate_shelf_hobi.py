@@ -47,7 +47,7 @@ from ..physics import GRAVITY
 from ..predicates import borne
 from ..robots import panda
 from ..robots.jaw import FINGER_ACROSS, PALM_ABOVE, TIP_BELOW, droop, pinch
-from ..scenario import Plan, Refutation, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT, Arm
 from ..sim.world import World
 from ..skills import jaw
@@ -86,14 +86,6 @@ class PlateShelfHobi(PlateAndSlot[Dish]):
     plate: Dish = Dish()
     gap: float = param(0.036, "m", 0.02, 0.09)  # width of the slot
     proud: float = param(0.04, "m", 0.0, 0.1)  # height by which the plate stands out of the slot
-
-    def failure(self, world: World) -> str | None:
-        knocked = world.touching("plate", "shelf") and not self.over_slot(world)
-        if lost := super().failure(world):
-            return lost
-        if knocked:
-            return Strict("the plate knocked against the shelf")
-        return Strict("the plate was raised without being pressed") if self.raised_unpressed(world) else None
 
     def means(self) -> Mapping[str, Mean]:
         pressed, held = (

@@ -36,8 +36,7 @@ from ..physics import GRAVITY
 from ..predicates import borne, fallen, rests_on, still
 from ..robots.jaw import PAD, pinch
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Action, Answer, Plan, Planner, Refutation, Shortcut, Strict, on_table, require, within_reach
-from ..sim.arm import ROBOT
+from ..scenario import Action, Answer, Plan, Planner, Refutation, Shortcut, on_table, require, within_reach
 from ..sim.world import World
 from ..skills.jaw import let_go, pick, weigh
 from ..skills.motion import COARSE, OPEN, STEADY, Pace, closing_along, facing_down, go_to, hold, retreat, until
@@ -78,10 +77,7 @@ class RodAcross(RodAndRidge[Rod]):
         return bool(world.tilt("rod") <= MAX_TILT and crossing and rests_on(world, "rod", RIDGE))
 
     def failure(self, world: World) -> str | None:
-        if fallen(world, "rod"):
-            return "the rod fell off the table"
-        let_go = not world.touching(ROBOT, "rod")
-        return Strict("the rod was let go and tipped") if let_go and world.tilt("rod") > MAX_TILT else None
+        return "the rod fell off the table" if fallen(world, "rod") else None
 
     def means(self) -> Mapping[str, Mean]:
         return {

@@ -47,7 +47,7 @@ from ..params import param, with_values
 from ..predicates import fallen
 from ..robots.jaw import PALM_ALONG
 from ..robots.panda import WRIST_MIDDLE
-from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import pick, put
@@ -117,12 +117,7 @@ class SeesawBalance(Scenario):
         )
 
     def failure(self, world: World) -> str | None:
-        if fallen(world, *world.free_bodies):
-            return "a block fell off the table"
-        others = {ROBOT, *world.free_bodies} - {"target"}
-        if any(world.touched(other, "target") for other in others):
-            return Strict("the target was touched")
-        return Strict("the target fell on the table") if world.touched("target", "table") else None
+        return "a block fell off the table" if fallen(world, *world.free_bodies) else None
 
     def means(self) -> Mapping[str, Mean]:
         def moved(world: World) -> bool:

@@ -54,7 +54,7 @@ from ..params import param
 from ..predicates import borne, fallen, rests_on, still
 from ..robots.jaw import OPEN_GAP, PALM_ABOVE, PALM_ACROSS, PALM_ALONG, TIP_BELOW
 from ..robots.panda import BASE, ROBOTVIEW
-from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import grasp, let_go, pick
@@ -80,9 +80,6 @@ GRIP_DEPTH = 0.025
 """Distance of the grip site behind the front of a long object [m]: the palm stays 6 mm before it."""
 LIFT_HEIGHT = 0.008
 """Height by which the object is lifted before it is drawn out [m]; the clearance above the palm is larger."""
-MAX_BESIDE = 0.025
-"""Distance beside the hand from which a touched object is felt, not grasped [m]. Fingers that close meet it within
-13 mm."""
 MIN_BETWEEN = 0.010
 """Least depth of the object's front behind the grip site when the robot first touches it [m]: the oracle comes 21 mm
 deep. The tips of fingers that meet the front are 9 mm before it."""
@@ -140,11 +137,7 @@ class ShelteredGrasp(Scenario):
         return between and rests_on(world, "thing", "tray") and still(world, "thing", 0.02)
 
     def failure(self, world: World) -> str | None:
-        if fallen(world, "thing"):
-            return "the thing fell off the table"
-        if self._sheltered(world) and world.touching(ROBOT, "thing") and self._beside(world) > MAX_BESIDE:
-            return Strict("the thing was felt for in the rack")
-        return None
+        return "the thing fell off the table" if fallen(world, "thing") else None
 
     def means(self) -> Mapping[str, Mean]:
         width, length, _ = self.thing.size
@@ -181,10 +174,6 @@ class ShelteredGrasp(Scenario):
         """Whether the object's middle is in the rack."""
         at = about_z(self.turn).T @ (world.com("thing") - self.foot)
         return bool(at[1] > self.rack.mouth)
-
-    def _beside(self, world: World) -> float:
-        """Distance of the object's middle from the hand, along the open side [m]."""
-        return abs(float((world.com("thing") - world.arm.hand) @ about_z(self.turn)[:, 0]))
 
     # --- oracle ---------------------------------------------------------------------------
 

@@ -45,7 +45,7 @@ from ..geometry import UP, Vec3, about_z, yaw_of
 from ..means import Mean, throughout
 from ..params import param
 from ..predicates import fallen, still
-from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, Strict, on_table, require, within_reach
+from ..scenario import Answer, Plan, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.arm import ROBOT
 from ..sim.world import World
 from ..skills.jaw import let_go, pick, release
@@ -123,18 +123,7 @@ class SlideCatch(Scenario):
     def failure(self, world: World) -> str | None:
         if any(world.touching(block, "table") for block in self.blocks):
             return "a block fell on the table"
-        if fallen(world, "bin", *self.blocks):
-            return "something fell off the table"
-        for block in self.blocks:
-            if world.touching(ROBOT, block):
-                return Strict("the robot touched a block")
-            if world.touching("bin", block) and self.ramp.under(world.com(block)):
-                return Strict("the bin touched a block on the ramp")
-        if world.touching(ROBOT, "incline/slab"):
-            return Strict("the robot touched the ramp")
-        if self.turned(world):
-            return Strict("the bin was turned while the ramp tilted")
-        return Strict("the bin tipped over") if world.tilt("bin") > math.radians(20.0) else None
+        return "something fell off the table" if fallen(world, "bin", *self.blocks) else None
 
     def means(self) -> Mapping[str, Mean]:
         def on_ramp(world: World, block: str) -> bool:
