@@ -15,8 +15,7 @@ from .sim.world import World
 Outcome = Literal["success", "failure", "timeout", "unstable"]
 """Result of an episode."""
 Rules = Literal["strict", "paper"]
-"""Rules of an episode: `strict`, under which a goal must be reached by the means of the task, or those of the paper.
-Rules that the paper lacks (`scenario.Strict`) belong to the former."""
+"""Rules of an episode: `strict`, under which a goal must be reached by the means of the task, or those of the paper."""
 STRICT: Rules = "strict"
 PAPER: Rules = "paper"
 RULES: tuple[Rules, ...] = (STRICT, PAPER)

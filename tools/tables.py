@@ -13,6 +13,7 @@ from typing import Any
 import baselines_page
 import numpy as np
 import predictors
+from failures import failures
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 
@@ -29,7 +30,6 @@ from scengen.episode import PAPER, STRICT
 from scengen.evidence import ledger
 from scengen.evidence.ledger import Evidence
 from scengen.measures import figures
-from scengen.measures.failures import failures
 from scengen.measures.figures import table
 from scengen.measures.policies import POLICIES
 from scengen.ood.analysis.leaks import SEARCH
@@ -286,11 +286,7 @@ def ending(task: Task) -> str:
     """The means of a task, and what ends an episode, as Markdown."""
     reasons, means = failures(task.family), "; ".join(task.nominal.means())
     lines = [f"Means: {means}.\n"] if means else []
-    lines += [
-        f"{kind}: {'; '.join(of)}.\n"
-        for kind, strict in {"Strict rules": True, "Other failures": False}.items()
-        if (of := [text for text, is_strict in reasons if is_strict == strict])
-    ]
+    lines += [f"Failures: {'; '.join(reasons)}.\n"] if reasons else []
     return "\n" + "\n".join(lines) if lines else ""
 
 

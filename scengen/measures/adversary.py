@@ -15,7 +15,6 @@ from ..evidence.ledger import Evidence
 from ..ood.analysis.leaks import SEARCH, leaks
 from ..samplers.split import ID
 from ..samplers.task import Task
-from .failures import failures
 from .measurement import Job, Measurement, Result, Row
 
 SEED = 4242
@@ -34,8 +33,8 @@ class _Searches(Measurement):
 class Attacks(_Searches):
     """Attacks on n training scenarios of a task with `budget` rollouts, as by `scengen attack`.
 
-    With `rules=paper` the strict rules are lifted: hits then show what the paper's rules admit. Tasks without a strict
-    rule are the same under both and are left out.
+    With `rules=paper` a goal counts however it is reached: hits then show what the paper's rules admit. Tasks without
+    means are the same under both and are left out.
     """
 
     KIND = "attack"
@@ -48,7 +47,7 @@ class Attacks(_Searches):
 
     def jobs(self, task: Task) -> Iterator[Job]:
         rules = check_rules(self.options["rules"])
-        if self.chosen(task) and (rules == STRICT or has_strict_rules(task)):
+        if self.chosen(task) and (rules == STRICT or task.nominal.means()):
             made_with = {"grammar": GRAMMAR, "rules": rules, "budget": self.options["budget"], "seed": SEED}
             yield Job(task, (ID,), made_with)
 
@@ -70,11 +69,6 @@ class Attacks(_Searches):
         refuted = bool(report["lost"]) or (bool(value["hits"]) and rules == STRICT)
         words = f"{report['rollouts']} rollouts, {len(value['hits'])} ways around, {len(report['lost'])} lost"
         return Result(job, [Row(ID, len(report["scenarios"]), value)], words, not refuted)
-
-
-def has_strict_rules(task: Task) -> bool:
-    """Whether a task has a rule that the paper lacks, or means."""
-    return bool(task.nominal.means()) or any(strict for _, strict in failures(task.family))
 
 
 @dataclass(frozen=True)

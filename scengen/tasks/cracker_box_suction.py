@@ -50,7 +50,6 @@ from .cracker_box import FLAT_TOLERANCE, HEIGHT_TOLERANCE, BoxAndSlot
 SEAT_TOLERANCE = 0.006  # largest distance of the box' middle from its seat along the table [m]
 MAX_FALL_SPEED = 0.35  # speed of a corner on its way down above which the crackers break [m/s]
 LEANING = math.radians(30.0)  # tilt above which a box does not stand [rad]
-REST_SPEED = 0.05  # speed of a corner on its way down below which a box does not fall [m/s]
 SEATED = 0.03, 0.010  # distances from its seat, along the table and in height, within which a box is in the slot [m]
 GRIP_SHARE = 0.6
 """Share of the box' height at which the cup takes it. It is so high that links 6 and 7, which reach 47 mm below the

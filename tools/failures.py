@@ -5,9 +5,9 @@ import inspect
 import textwrap
 
 
-def failures(family: type) -> list[tuple[str, bool]]:
-    """Reasons of failures of a family, in the order in which they are judged, and whether each is strict."""
-    found: list[tuple[str, bool]] = []
+def failures(family: type) -> list[str]:
+    """Reasons of failures of a family, in the order in which they are judged."""
+    found: list[str] = []
     seen = {"failure"}
     todo = ["failure"]
     for name in todo:  # grows by the methods that also give reasons
@@ -24,27 +24,25 @@ def failures(family: type) -> list[tuple[str, bool]]:
     return list(dict.fromkeys(found))
 
 
-def _reasons(tree: ast.AST) -> tuple[list[tuple[str, bool]], list[str]]:
-    """Texts that a method returns, each with whether it is strict; and methods of the family that it returns."""
-    texts, called = list[tuple[str, bool]](), list[str]()
+def _reasons(tree: ast.AST) -> tuple[list[str], list[str]]:
+    """Texts that a method returns, and methods of the family that it returns."""
+    texts, called = list[str](), list[str]()
 
-    def look(node: ast.AST | None, strict: bool = False) -> None:
+    def look(node: ast.AST | None) -> None:
         match node:
             case ast.Constant(value=str(text)):
-                texts.append((text, strict))
+                texts.append(text)
             case ast.JoinedStr(values=parts):
                 plain = (p.value if isinstance(p, ast.Constant) else "..." for p in parts)
-                texts.append(("".join(map(str, plain)), strict))
-            case ast.Call(func=ast.Name(id="Strict"), args=[text]):
-                look(text, True)
+                texts.append("".join(map(str, plain)))
             case ast.Call(func=ast.Attribute(value=ast.Name(id="self"), attr=name)):
                 called.append(name)
             case ast.IfExp(body=one, orelse=other):
-                look(one, strict)
-                look(other, strict)
+                look(one)
+                look(other)
             case ast.BoolOp(values=parts):
                 for part in parts:
-                    look(part, strict)
+                    look(part)
 
     for node in ast.walk(tree):
         if isinstance(node, ast.Return):
