@@ -69,7 +69,7 @@ TOP_DISTANCE = 0.028  # distance from the high end of the ramp at which balls ar
 CARRY_HEIGHT = 0.19  # height over the table at which balls are carried [m]
 RELEASE_HEIGHT = 0.012  # height over the ramp from which balls are lowered [m]
 MAX_FLIGHT_SPEED = 0.3
-"""Largest speed of a ball in the air over the upper half of the ramp [m/s]: as of a fall from 5 mm."""
+"""Largest speed of a ball that has been let go above the ramp [m/s]: as of a fall from 5 mm."""
 LOWER_PACE = Pace(0.25, 0.004)  # pace down to a ball or to the ramp
 
 
@@ -166,8 +166,9 @@ class RampSort(Scenario):
             return side * (across - self.ramp.ridge) > 0.0 or "ramp" not in world.touching_bodies(f"ball_{i}")
 
         def laid(world: World, i: int, along: float, across: float) -> bool:
-            over = abs(along) < self.ramp.length / 2 and along < BARRIER_START and abs(across) < self._half_width
-            return not over or bool(world.touching_bodies(f"ball_{i}")) or still(world, f"ball_{i}", MAX_FLIGHT_SPEED)
+            over = abs(along) < self.ramp.length / 2 and abs(across) < self._half_width
+            flies = over and not world.touching(ROBOT, f"ball_{i}") and not world.touched(f"ball_{i}", "ramp")
+            return not flies or still(world, f"ball_{i}", MAX_FLIGHT_SPEED)
 
         def rolls(world: World, i: int, along: float, across: float) -> bool:
             carried = self.high_over_ramp(world, i) or world.touching(ROBOT, f"ball_{i}")
