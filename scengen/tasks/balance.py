@@ -71,7 +71,7 @@ SLIDE_SPEED = 0.15  # speed across the ridge at which a shortcut releases the ro
 class UprightRod(RodAndRidge[InlaidRod]):
     """A rod that stands on the table, and a ridge."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 1.0
 
     rod_x: float = param(-0.13, "m", -0.4, 0.4)

@@ -73,7 +73,7 @@ CARRY_PACE = Pace(0.15, 0.01)  # pace with the cage in the hand: slow enough for
 class BallCageEscape(Scenario):
     """A cage on a stool, with a ball in it. Lengths are along the cage's axes."""
 
-    VERSION = 1
+    VERSION = 2
 
     HOLD: ClassVar[float] = 0.3
 

@@ -75,7 +75,7 @@ CATCHABLE_DISTANCE = 0.06  # distance of the ball's centre from the walls from w
 class BounceIntercept(LaunchedBall):
     """A ball that is launched between three walls."""
 
-    VERSION = 1
+    VERSION = 2
 
     side: int = param(1, "1 to the left, -1 to the right", -1, 1)
     """Side to which the ball is launched; `y`, `aim` and `turn` are mirrored with it."""

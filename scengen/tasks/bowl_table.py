@@ -82,7 +82,7 @@ LOWER_SPEED = 0.04  # speed at which the bowl is put down [m/s]
 class BowlTable(Scenario):
     """A bowl upside down in a rack and a green square on the table."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.5
 
     rack_x: float = param(-0.05, "m", -0.3, 0.2)

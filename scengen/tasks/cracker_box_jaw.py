@@ -68,7 +68,7 @@ MIN_SLIDE_CLEARANCE = 0.0005  # least clearance of the box as it is pushed betwe
 class CrackerBoxJaw(BoxAndSlot):
     """A box of crackers that stands on the table, and a slot."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.5
 
     box_x: float = param(-0.06, "m", -0.4, 0.4)

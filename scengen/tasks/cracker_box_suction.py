@@ -67,7 +67,7 @@ CARRY_HEIGHT = 0.02  # height of the box over the slot's walls before it is lowe
 class CrackerBoxSuction(BoxAndSlot):
     """A box of crackers that stands on the table, and a slot."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.5
 
     box_x: float = param(-0.13, "m", -0.4, 0.4)

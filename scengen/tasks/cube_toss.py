@@ -97,7 +97,7 @@ at which the former decreases [m/s]."""
 class CubeToss(Scenario):
     """A cube in the gripper and a tray on the floor, or on a post, beyond the arm's reach."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.3
 
     distance: float = param(1.02, "m", 0.9, 1.3)  # distance of the middle of the tray from the robot's first axis

@@ -83,7 +83,7 @@ REST_SPEED = 0.02  # speed below which the block counts as at rest [m/s]
 class CupExtract(Scenario):
     """A block in a cup with a handle, and a green square on the table."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.3
 
     x: float = param(0.0, "m", -0.4, 0.4)

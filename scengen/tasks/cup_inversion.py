@@ -78,7 +78,7 @@ straight ahead from 0.79."""
 class CupInversion(Scenario):
     """A cup upside down on the table, and a green square."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.5
 
     x: float = param(-0.05, "m", -0.4, 0.4)

@@ -71,7 +71,7 @@ CARRY_TOLERANCE = 0.01
 class DominoSelect(Scenario):
     """Five parallel chains, one intact, four with a defect, and two slabs; first tiles may differ from the others."""
 
-    VERSION = 1
+    VERSION = 2
 
     count: int = param(4, "tiles", 3, 8)
     gap_ratio: float = param(1.25, "tile widths", 0.2, 2.5)

@@ -77,7 +77,7 @@ PUSH_TIMEOUT = 10.0  # time after which a push is given up [s]
 class EdgeSlide(Scenario):
     """A plate that lies near one of the table's side edges."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.3
 
     side: int = param(1, "1 left, -1 right", -1, 1)

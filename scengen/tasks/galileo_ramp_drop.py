@@ -62,7 +62,7 @@ CARRY_HEIGHT = 0.12
 class GalileoRampDrop(Scenario):
     """A ramp with a patch on its far side, and a ball in a tray beside its near side."""
 
-    VERSION = 1
+    VERSION = 2
 
     HOLD: ClassVar[float] = 0.3
     """The slowest ball that crosses the patch takes sqrt(2 length / (g sin slope)) < 0.2 s at 12 deg or more."""

@@ -68,7 +68,7 @@ CONTACT_SPEED = 0.04  # speed at which the hand approaches the ball [m/s]
 class GapFunnel(Scenario):
     """A ball, a wall with a gap, and a zone behind it."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.3
 
     wall_x: float = param(0.15, "m", 0.0, 0.3)

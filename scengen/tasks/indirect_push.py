@@ -95,7 +95,7 @@ class Spot(Bounded):
 class IndirectPush(Scenario):
     """A red block and a zone at the far end of the table, and three blocks at its near end."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.3
 
     bearing: float = param(20.0, "deg", -45.0, 45.0)

@@ -77,7 +77,7 @@ last in its way, in the agent's turn the time that it let go by [s]."""
 class KeyboardTyping(Scenario):
     """A keyboard between two arms, and a word whose letters are shared out."""
 
-    VERSION = 1
+    VERSION = 2
 
     word: int = param(0, "words", 0, len(WORDS) - 1)  # number of the word in `WORDS`
     mine: int = param(0b01010, "1", 1, 254, answer=True)

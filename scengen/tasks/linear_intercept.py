@@ -73,7 +73,7 @@ LOW_SETTLING_TIME = 0.6  # time that a low hand needs besides its way, to stand 
 class LinearIntercept(LaunchedBall):
     """A ball that is launched over the table."""
 
-    VERSION = 1
+    VERSION = 2
 
     x: float = param(0.0, "m", -0.36, 0.36)
     y: float = param(0.32, "m", -0.36, 0.36)

@@ -85,7 +85,7 @@ class Spot(Bounded):
 class MassSort(Scenario):
     """Three cubes in front of three zones."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.3
 
     light: float = param(0.05, "kg", 0.02, 0.6, hidden=True)

@@ -81,7 +81,7 @@ class Spot(Bounded):
 class OccluderPush(Scenario):
     """Three covered cubes and a green patch."""
 
-    VERSION = 1
+    VERSION = 2
     CONCEALED = ("cube_*",)
     HOLD = 0.3
 

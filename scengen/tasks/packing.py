@@ -86,7 +86,7 @@ class Spot(Bounded):
 class Packing(Scenario):
     """Three or four L-shaped pieces and the bin whose footprint they were cut from. Lengths of strips are in units."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.3
 
     count: int = param(3, "pieces", 3, 4)

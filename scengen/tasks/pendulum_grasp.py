@@ -83,7 +83,7 @@ NEAR_SIDE = -1  # side of the turning point that is nearer to the robot
 class PendulumGrasp(Scenario):
     """A pendulum that swings below a gantry on the table."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.3
     DISTURBED = (HINGE,)
 

@@ -72,7 +72,7 @@ class Jump:
 class PickPlaceYcb(Scenario):
     """An object on the table, and a green square that is going to jump a few times."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.5
     NO_ABLATIONS = "the scene holds nothing that helps; a square that stays would leave less to do"
 

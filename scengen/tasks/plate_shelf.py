@@ -65,7 +65,7 @@ the lip."""
 class PlateShelf(PlateAndSlot[Plate]):
     """A plate on the table and a shelf with a slot."""
 
-    VERSION = 1
+    VERSION = 2
 
     plate_x: float = param(-0.17, "m", -0.3, 0.2)
     plate_y: float = param(-0.06, "m", -0.35, 0.35)

@@ -76,7 +76,7 @@ PALM_CLEARANCE = 0.005  # gap between palm and table [m]
 class PlateShelfHobi(PlateAndSlot[Dish]):
     """A plate on the table and a shelf with a slot."""
 
-    VERSION = 1
+    VERSION = 2
 
     plate_x: float = param(-0.15, "m", -0.3, 0.2)
     plate_y: float = param(-0.03, "m", -0.35, 0.35)

@@ -77,7 +77,7 @@ LOWER_PACE = Pace(0.25, 0.004)  # pace down to a ball or to the ramp
 class RampSort(Scenario):
     """Balls of two colours in a box, a crowned ramp, and a bin for either colour behind a barrier."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.5
 
     reds: int = param(2, "balls", 1, 3)

@@ -80,7 +80,7 @@ ENTER_SPEED = 0.08  # speed at which the held peg enters the slot [m/s]
 class RecoverPegInsert(Scenario):
     """A peg on a plinth, and a board on a pin; everything is mirrored if the board is on the right."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.3
 
     peg_x: float = param(-0.075, "m", -0.4, 0.4)

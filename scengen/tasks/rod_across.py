@@ -58,7 +58,7 @@ EXPECTED_MASS = 0.125  # mass that a guess assumes without having weighed the ro
 class RodAcross(RodAndRidge[Rod]):
     """A rod with a hidden centre of mass on the table, and a ridge."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 1.0
 
     rod_x: float = param(-0.16, "m", -0.4, 0.4)

@@ -77,7 +77,7 @@ BEAM = "seesaw/beam"
 class SeesawBalance(Scenario):
     """A seesaw with the target on its deck, and a counterweight on the table in front of it."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 3.0
     """Time for which the deck must stay level [s]. On its way to 6 deg on the other side it creeps through +-5 deg in
     (damping / stiffness) ln(11 / 1) = 0.12 / 0.15 x 2.4 = 1.9 s, for the softest seesaw of training."""

@@ -92,7 +92,7 @@ RELEASE_HEIGHT = 0.072
 class ShelteredGrasp(Scenario):
     """An object in a rack that is open on one side, and a tray on the table before it."""
 
-    VERSION = 1
+    VERSION = 2
     CONCEALED = ("thing",)
     HOLD = 0.3
 

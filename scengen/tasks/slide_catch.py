@@ -71,7 +71,7 @@ DRAW_PACE = Pace(0.30, 0.004)  # pace of the bin
 class SlideCatch(Scenario):
     """A ramp that tilts, three blocks on it, and a bin with a handle."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.5
     MOVING = ("block_0", "block_1", "block_2")
 

@@ -99,7 +99,7 @@ class Slip:
 class SlipRecovery(Scenario):
     """An object on the table, a green square at some distance, and one slip or several on the way."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.5
     NO_ABLATIONS = "the scene holds nothing that helps; without the slip less would be left to do"
 

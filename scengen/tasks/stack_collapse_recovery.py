@@ -88,7 +88,7 @@ class Blow(Bounded):
 class StackCollapseRecovery(Scenario):
     """A tower of three cubes and one blow or two."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 1.0
     NO_ABLATIONS = "every cube is part of what is asked for; without the blow nothing is left to do"
 

@@ -75,7 +75,7 @@ PULL_END_DISTANCE = 0.60
 class ToolRetrieve(Scenario):
     """A cube near the far edge of the table, and a hook at the robot's side."""
 
-    VERSION = 1
+    VERSION = 2
     HOLD = 0.3
 
     distance: float = param(0.925, "m", 0.5, 1.1)

@@ -12,7 +12,7 @@ from helpers import REFERENCE
 from scengen import cli
 from scengen.pool import Pool
 from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations
-from scengen.scenario import Strict
+from scengen.means import throughout
 from scengen.tasks.domino_single import DominoSingle
 
 
@@ -107,9 +107,9 @@ def test_rollouts_are_recorded_with_their_failures_on_request(kept, tmp_path):
 
 @pytest.mark.parametrize("rules", ["strict", "paper"])
 def test_episodes_are_judged_by_the_rules_that_they_were_played_under(tmp_path, monkeypatch, capsys, rules):
-    """A strict rule that every witness breaks: lifted, the witnesses count, wherever they are judged."""
-    broken = lambda self, world: Strict("too late") if world.time > 0.3 else None  # noqa: E731
-    monkeypatch.setattr(DominoSingle, "failure", broken)
+    """A mean that every witness lacks: under the paper's rules the witnesses count, wherever they are judged."""
+    early = {"it took 0.3 s at most": throughout(lambda world: world.time <= 0.3)}
+    monkeypatch.setattr(DominoSingle, "means", lambda self: early)
     assert evaluate(tmp_path / "out", "policy=oracle", f"rules={rules}") == 0
     folder, data = tmp_path / "out" / "rollouts" / REFERENCE.name, tmp_path / "data"
     found = Demonstrations.open(folder)

@@ -43,22 +43,29 @@ EDITS = (
         EVENT,
     ),
     Edit(
-        "strict_rule_removed",
+        "mean_removed",
         ("balance_hard",),
         (
             (
                 BALANCE,
-                '        return Strict("the rod was touched again on the ridge") if touched and self.released(world)'
-                " else None",
-                "        return None",
+                '            "the rod was not dropped": throughout(lambda world: not dropped(world)),\n',
+                "",
             ),
         ),
         RULE,
     ),
     Edit(
-        "strict_rule_becomes_the_source's",
+        "mean_becomes_a_rule_of_the_source",
         ("balance_hard",),
-        ((BALANCE, 'Strict("the rod was let go and tipped")', '"the rod was let go and tipped"'),),
+        (
+            (
+                BALANCE,
+                '        return "the rod fell off the table" if fallen(world, "rod") else None',
+                '        return "the rod fell off the table" if fallen(world, "rod") or (\n'
+                '            world.velocity("rod")[5] < -MAX_FALL_SPEED and not world.touching_bodies("rod")\n'
+                "        ) else None",
+            ),
+        ),
         RULE,
     ),
     Edit(
@@ -148,7 +155,7 @@ EDITS = (
     Edit(
         "angle_of_a_fall",
         ("shape_stack",),
-        ((SHAPES, "world.tilt(n) > FALL_ANGLE", "world.tilt(n) > 1.02 * FALL_ANGLE"),),
+        ((SHAPES, "world.tilt(name) <= FALL_ANGLE", "world.tilt(name) <= 1.02 * FALL_ANGLE"),),
         RULE,
     ),
     Edit(
@@ -160,19 +167,25 @@ EDITS = (
     Edit(
         "hop_at_a_release",
         ("galileo_ramp_drop",),
-        ((RAMP, 'world.com("ball")) > 0.01:', 'world.com("ball")) > 0.0102:'),),
+        ((RAMP, "MAX_HOP = 0.01 ", "MAX_HOP = 0.0102 "),),
         RULE,
     ),
     Edit(
         "rise_of_a_ball",
         ("gap_funnel",),
-        ((FUNNEL, "self.start[2] > MAX_RISE", "self.start[2] > 1.02 * MAX_RISE"),),
+        (
+            (
+                FUNNEL,
+                'low = world.com("ball")[2] - self.start[2] <= MAX_RISE',
+                'low = world.com("ball")[2] - self.start[2] <= 1.02 * MAX_RISE',
+            ),
+        ),
         RULE,
     ),
     Edit(
-        "feeling_in_a_rack",
+        "depth_between_the_fingers",
         ("sheltered_grasp",),
-        ((SHELTER, "self._beside(world) > MAX_BESIDE", "self._beside(world) > 1.02 * MAX_BESIDE"),),
+        ((SHELTER, "MIN_BETWEEN = 0.010\n", "MIN_BETWEEN = 0.0102\n"),),
         RULE,
     ),
     Edit(
@@ -194,9 +207,9 @@ EDITS = (
         RULE,
     ),
     Edit(
-        "box_laid_beside",
+        "tilt_of_a_laid_box",
         ("cracker_box_suction",),
-        ((SUCTION, 'world.tilt("box") < LEANING', 'world.tilt("box") < 1.02 * LEANING'),),
+        ((SUCTION, 'world.tilt("box") >= LEANING', 'world.tilt("box") >= 1.02 * LEANING'),),
         RULE,
     ),
     Edit(

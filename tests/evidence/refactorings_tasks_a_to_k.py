@@ -13,20 +13,19 @@ RAMP = "scengen/tasks/galileo_ramp_drop.py"
 
 EDITS = (
     Edit(
-        "balance_failure_by_guards",
+        "balance_failure_by_guard",
         ("balance_hard",),
         (
             (
                 BALANCE,
-                '        return Strict("the rod was touched again on the ridge") if touched and self.released(world)'
-                " else None",
-                "        if not (touched and self.released(world)):\n            return None\n"
-                '        return Strict("the rod was touched again on the ridge")',
+                '        return "the rod fell off the table" if fallen(world, "rod") else None',
+                '        if not fallen(world, "rod"):\n            return None\n'
+                '        return "the rod fell off the table"',
             ),
             (
                 BALANCE,
-                '        if not world.touching_bodies("rod") and world.velocity("rod")[5] < -MAX_FALL_SPEED:',
-                '        if not (world.touching_bodies("rod") or -MAX_FALL_SPEED <= world.velocity("rod")[5]):',
+                'return world.velocity("rod")[5] < -MAX_FALL_SPEED and not world.touching_bodies("rod")',
+                'return not (world.touching_bodies("rod") or -MAX_FALL_SPEED <= world.velocity("rod")[5])',
             ),
         ),
     ),
@@ -64,24 +63,12 @@ EDITS = (
         (
             (
                 CAGE,
-                "        if self.cage.passes(at, self.ball.radius):\n"
-                '            if not world.touching(ROBOT, "cage") or not world.touching_bodies("cage") <= {ROBOT,'
-                ' "ball"}:\n'
-                '                return Strict("the ball left a cage that was not lifted")\n'
-                "            if self.lean(world) < self.rolling_tilt + SHAKE_TILT:\n"
-                '                return Strict("the ball was shaken out of the cage")\n'
-                '        return Strict("the ball rolled to the end without the hole") if self.at_wrong_end(at) else'
-                " None\n",
-                "        if self.cage.passes(at, self.ball.radius) and (reason := self._escaped(world)):\n"
-                "            return reason\n"
-                '        return Strict("the ball rolled to the end without the hole") if self.at_wrong_end(at) else'
-                " None\n"
-                "\n    def _escaped(self, world: World) -> str | None:\n"
-                '        """Reason why a ball that passes the hole has been let out wrongly, or None."""\n'
-                '        if not (world.touching(ROBOT, "cage") and world.touching_bodies("cage") <= {ROBOT, "ball"}):\n'
-                '            return Strict("the ball left a cage that was not lifted")\n'
-                "        shaken = self.lean(world) < self.rolling_tilt + SHAKE_TILT\n"
-                '        return Strict("the ball was shaken out of the cage") if shaken else None\n',
+                '        if fallen(world, "ball", below=0.0):\n            return "the ball fell off the table"\n'
+                '        return "the cage fell off the table" if fallen(world, "cage", below=0.0) else None\n',
+                '        return self._lost(world, "ball") or self._lost(world, "cage")\n'
+                "\n    def _lost(self, world: World, name: str) -> str | None:\n"
+                '        """Reason why a thing that fell off the table is lost, or None."""\n'
+                '        return f"the {name} fell off the table" if fallen(world, name, below=0.0) else None\n',
             ),
         ),
     ),
@@ -99,10 +86,8 @@ EDITS = (
             ),
             (
                 SUCTION,
-                "        return self.fall_speed(world) < REST_SPEED and (math.hypot(off[0], off[1]) > aside or"
-                " abs(off[2]) > high)",
-                "        away = not (math.hypot(off[0], off[1]) <= aside and abs(off[2]) <= high)\n"
-                "        return away and self.fall_speed(world) < REST_SPEED",
+                "        return math.hypot(off[0], off[1]) <= aside and abs(off[2]) <= high",
+                "        return not (abs(off[2]) > high or math.hypot(off[0], off[1]) > aside)",
             ),
         ),
     ),
@@ -151,19 +136,13 @@ EDITS = (
         (
             (
                 DOMINO,
-                '        if touched_only(world, "tile_0"):\n            return Strict("the robot touched a tile'
-                " other than"
-                ' the first")\n'
-                '        if carried(world, "tile_0", self.spot(0), CARRY_TOLERANCE):\n'
-                '            return Strict("the robot carried the first tile away")\n        return None\n',
-                "        return self._cheated(world)\n\n"
-                "    def _cheated(self, world: World) -> Strict | None:\n"
-                '        """A rule of ours that the robot has broken, or None."""\n'
-                '        first = "tile_0"\n'
-                "        if touched_only(world, first) is not None:\n"
-                '            return Strict("the robot touched a tile other than the first")\n'
-                "        away = carried(world, first, self.spot(0), CARRY_TOLERANCE)\n"
-                '        return Strict("the robot carried the first tile away") if away else None\n',
+                '        if world.touched(ROBOT, "slab"):\n            return "the robot touched the slab"\n'
+                "        return None\n",
+                "        return self._lost(world)\n\n"
+                "    def _lost(self, world: World) -> str | None:\n"
+                '        """Reason why the slab is lost, or None."""\n'
+                '        touched = world.touched(ROBOT, "slab")\n'
+                '        return "the robot touched the slab" if touched else None\n',
             ),
         ),
     ),
@@ -199,28 +178,33 @@ EDITS = (
         rounds=True,
     ),
     Edit(
-        "funnel_failure_with_locals",
+        "funnel_means_with_locals",
         ("gap_funnel",),
         (
             (
                 FUNNEL,
-                '        return Strict("the ball was lifted") if world.com("ball")[2] - self.start[2] > MAX_RISE'
-                " else None",
-                '        rise = world.com("ball")[2] - self.start[2]\n'
-                '        return None if rise <= MAX_RISE else Strict("the ball was lifted")',
+                '            low = world.com("ball")[2] - self.start[2] <= MAX_RISE\n'
+                '            return low and not world.touching(ROBOT, "ball")',
+                '            rise = world.com("ball")[2] - self.start[2]\n'
+                '            free = not world.touching(ROBOT, "ball")\n'
+                "            return rise <= MAX_RISE and free",
             ),
         ),
     ),
     Edit(
-        "ramp_failure_reordered_conditions",
+        "ramp_means_reordered_conditions",
         ("galileo_ramp_drop",),
         (
             (
                 RAMP,
-                '        if touching and world.touched("ball", "ramp/far"):\n',
-                '        if world.touched("ball", "ramp/far") and touching:\n',
+                'return world.arm.grips("ball") and world.touching("ball", "ramp/near")',
+                'return world.touching("ball", "ramp/near") and world.arm.grips("ball")',
             ),
-            (RAMP, "        if along > 0.0 and touching:\n", "        if touching and 0.0 < along:\n"),
+            (
+                RAMP,
+                'return on_floor and self.along(world.com("ball")) < 0.0 and',
+                'return 0.0 > self.along(world.com("ball")) and on_floor and',
+            ),
         ),
     ),
 )

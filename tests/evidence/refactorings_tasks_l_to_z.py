@@ -156,8 +156,8 @@ EDITS = (
             ),
             (
                 PENDULUM,
-                'from wide open") if self.narrow(world) else None',
-                'from wide open") if self._was_narrow(world) else None',
+                "throughout(lambda world: not self.narrow(world))",
+                "throughout(lambda world: not self._was_narrow(world))",
             ),
             (
                 PENDULUM,
@@ -202,20 +202,14 @@ EDITS = (
         ),
     ),
     Edit(
-        "launched_ball_rule_by_match",
+        "launched_ball_mean_by_match",
         ("linear_intercept",),
         (
             (
                 "scengen/tasks/launched_ball.py",
-                '        if memory["moved"] > WAITING_TOLERANCE:\n'
-                '            return Strict("the hand did not wait for the ball")\n'
-                '        if not memory["caught"] and world.time - memory["first_touch"] > CATCHING_TIME:\n'
-                '            return Strict("the ball was touched and not caught")\n        return None\n',
-                '        late = world.time - memory["first_touch"] > CATCHING_TIME and not memory["caught"]\n'
-                '        match memory["moved"] > WAITING_TOLERANCE, late:\n'
-                '            case True, _:\n                return Strict("the hand did not wait for the ball")\n'
-                '            case _, True:\n                return Strict("the ball was touched and not caught")\n'
-                "        return None\n",
+                "            return first > 0.0 and world.time - first >= ARRIVAL_TIME\n",
+                "            match first:\n                case 0.0:\n                    return False\n"
+                "                case _:\n                    return world.time - first >= ARRIVAL_TIME\n",
             ),
         ),
     ),

@@ -14,7 +14,7 @@ from scengen.cli.commands import BAD_INPUT, FAILED, OK
 from scengen.demos.teleop.pad import read_events
 from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations, write_demonstrations
 from scengen.pool.files import sha256
-from scengen.scenario import Strict
+from scengen.means import throughout
 from scengen.tasks.domino_single import DominoSingle
 
 
@@ -45,7 +45,8 @@ def test_a_driven_episode_is_a_demonstration_with_source_operator_and_seed(made)
 
 
 def test_takes_are_judged_by_the_rules_that_were_asked_for(tmp_path, monkeypatch):
-    monkeypatch.setattr(DominoSingle, "failure", lambda self, world: Strict("too late") if world.time > 0.3 else None)
+    early = {"it took 0.3 s at most": throughout(lambda world: world.time <= 0.3)}
+    monkeypatch.setattr(DominoSingle, "means", lambda self: early)
     assert teleop(tmp_path / "strict", n=1, takes=1, limit=1) == FAILED
     assert teleop(tmp_path / "paper", n=1, rules="paper") == OK
     found = Demonstrations.open(tmp_path / "paper")
