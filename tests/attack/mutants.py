@@ -1,4 +1,4 @@
-"""Weakened families: one clause of a goal, a failure or the constraints left out or made wide.
+"""Weakened families: one mean, or one clause of a goal, a failure or the constraints, left out or made wide.
 
 Clauses are found in the source, so that mutants follow the families: every `if` of `failure`, every operand of
 `success`. Limits are constants of the modules. Values are scenarios that the constraints refute.
@@ -19,6 +19,7 @@ from unittest import mock
 from scengen import list_tasks, load_task
 from scengen.attack.campaign import Subject
 from scengen.attack.evidence import Hit
+from scengen.means import Mean
 from scengen.pool.names import Name
 from scengen.samplers.task import Task
 from scengen.scenario import Scenario
@@ -128,8 +129,10 @@ def mutants() -> list[Mutant]:
 
 
 def clauses(task: str) -> Iterator[Mutant]:
-    """The family without one clause of its failure or of its goal."""
+    """The family without one of its means, or one clause of its failure or of its goal."""
     family = load_task(task).family
+    for name in load_task(task).nominal.means():
+        yield Mutant(task, f"no mean: {name}", {"means": _without(family.means, name)})
     if family.failure is not Scenario.failure:
         tree = _parsed(family.failure)
         for statement in list(tree.body):
@@ -155,6 +158,10 @@ def clauses(task: str) -> Iterator[Mutant]:
             break
     if family.HOLD:
         yield Mutant(task, "no hold", {"HOLD": 0.0})
+
+
+def _without(means: Callable[[Any], Mapping[str, Mean]], gone: str) -> Callable[[Any], Mapping[str, Mean]]:
+    return lambda scenario: {name: mean for name, mean in means(scenario).items() if name != gone}
 
 
 def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hands import shape_stack, sheltered_grasp
+from hand import otherwise
 from test_servo import player_of
 
 from scengen.attack.detours import DETOUR, detours, takings
@@ -32,14 +32,14 @@ def solving(player, kind):
 
 @pytest.mark.slow
 def test_what_is_held_is_pressed_on_another_body_and_the_goal_is_reached_all_the_same():
-    player = player_of("shape_stack", shape_stack.unmended)
+    player = player_of("shape_stack", otherwise)
     reasons = [refused(player, "shape_stack", played) for _, played in solving(player, "press")]
-    assert "a shape was set on the cone" in reasons
+    assert any("nothing was set on the cone" in reason for reason in reasons)
 
 
 @pytest.fixture(scope="module")
 def felt():
-    return player_of("sheltered_grasp", sheltered_grasp.unmended)
+    return player_of("sheltered_grasp", otherwise)
 
 
 def test_a_body_that_was_pushed_aside_is_taken_where_it_is_then(felt):
@@ -48,7 +48,7 @@ def test_a_body_that_was_pushed_aside_is_taken_where_it_is_then(felt):
     again = next(macro for macro in attempt.macros if macro.kind == "resume")
     before = felt.trace.ways[body][felt.trace.stages[stage].row]
     assert again.target == body and np.linalg.norm(before - felt.start_place(body)) < 0.01
-    assert refused(felt, "sheltered_grasp", played) == "the thing was felt for in the rack"
+    assert "when the robot first touched it" in refused(felt, "sheltered_grasp", played)
 
 
 def test_where_nothing_has_moved_a_resumed_witness_is_the_witness(felt):

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hands import gap_funnel
-from hands.linear_intercept import unmended
+from hand import otherwise
 
 from scengen.attack.adversary import Attack
 from scengen.attack.player import Player
@@ -29,7 +28,7 @@ def player_of(name, change=lambda scenario: scenario):
 
 def slow(scenario):
     """The ball rolls so slowly that a hand can follow it, and no rule asks the hand to wait for it."""
-    return unmended(replace(scenario, speed=0.12))
+    return otherwise(replace(scenario, speed=0.12))
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +72,7 @@ def test_where_the_goal_asks_for_no_touch_none_is_made():
 
 def test_a_body_is_carried_along_its_way_with_the_narrow_side_of_the_hand_across():
     closed = load_task("gap_funnel").draw("id", 11, 0).scenario
-    player = player_of("gap_funnel", gap_funnel.unmended)
+    player = player_of("gap_funnel", otherwise)
     attempt = next(one for one in servo(player) if one.macros[-1].kind == "along")
     played = player.play(attempt.macros, raw=False)
     assert played.solved

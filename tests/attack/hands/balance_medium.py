@@ -1,6 +1,6 @@
 """T31: ways to a rod on the ridge without setting it down in its place."""
 
-from hand import Hand
+from hand import Hand, otherwise
 
 from scengen.geometry import UP
 from scengen.params import values, with_values
@@ -15,26 +15,12 @@ from scengen.tasks.balance import GRIP_DEPTH, LIFT_HEIGHT, MAX_TILT, RIDGE, Upri
 class Leaned(UprightRod):
     """The task if a rod counts that the robot touches, as often as it likes."""
 
-    def failure(self, world: World) -> str | None:
-        return None
-
     def success(self, world: World) -> bool:
         return world.tilt("rod") <= MAX_TILT and world.touching_bodies("rod") - {ROBOT} == {RIDGE}
 
 
-class AnyTry(UprightRod):
-    """The task without its rules on falls and second tries."""
-
-    def failure(self, world: World) -> str | None:
-        return None
-
-
 def leaned(scenario: Scenario) -> Scenario:
-    return with_values(Leaned(), values(scenario))
-
-
-def any_try(scenario: Scenario) -> Scenario:
-    return with_values(AnyTry(), values(scenario))
+    return otherwise(with_values(Leaned(), values(scenario)))
 
 
 def hold_its_end(scenario: Scenario, world: World) -> Plan:
@@ -75,6 +61,6 @@ def drop_from_above(scenario: Scenario, world: World) -> Plan:
 HANDS = {
     "hold_its_end": Hand(hold_its_end, leaned),
     "lean_on_a_finger": Hand(lean_on_a_finger, leaned),
-    "open_and_catch": Hand(open_and_catch, any_try),
-    "drop_from_above": Hand(drop_from_above, any_try),
+    "open_and_catch": Hand(open_and_catch),
+    "drop_from_above": Hand(drop_from_above),
 }

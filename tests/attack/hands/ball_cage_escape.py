@@ -1,29 +1,16 @@
 """T22: the ball is brought out of a cage that is tilted less than it needs, by jerks of the hand."""
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 from hand import Hand
 
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.motion import CLOSED
 from scengen.tasks.ball_cage_escape import BallCageEscape
 
 SHAKE_TIME = 5.0  # time for which the cage is shaken [s]
-
-
-class Shakeable(BallCageEscape):
-    """The task without its rule on balls that are shaken out: every cage counts as tilted."""
-
-    def lean(self, world: World) -> float:
-        return math.pi / 2
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(Shakeable(), values(scenario))
 
 
 def shaken(level: Callable[[float], float]) -> Callable[[Scenario, World], Plan]:
@@ -55,7 +42,7 @@ def slow_and_fast(seconds: float) -> float:
 
 
 HANDS = {
-    "jerk": Hand(shaken(to_and_fro), unmended),
-    "jerk_raw": Hand(shaken(to_and_fro), unmended, raw=True),
-    "creep": Hand(shaken(slow_and_fast), unmended),
+    "jerk": Hand(shaken(to_and_fro)),
+    "jerk_raw": Hand(shaken(to_and_fro), raw=True),
+    "creep": Hand(shaken(slow_and_fast)),
 }

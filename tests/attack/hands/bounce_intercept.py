@@ -8,27 +8,14 @@ from hand import Hand
 from scengen.assets.prop import TABLE_HALF
 from scengen.attack.plans import HOVER_HEIGHT, LOWEST_HAND, pursue, velocity_of
 from scengen.geometry import UP, Vec3
-from scengen.params import values, with_values
 from scengen.robots.panda import BASE
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.jaw import grasp
 from scengen.skills.motion import COARSE, OPEN, closing_along, hold, retreat, stay
-from scengen.tasks.bounce_intercept import BounceIntercept
 
 PARKED: Vec3 = np.array([-0.15, 0.0, LOWEST_HAND + 0.07])  # place of the hand until the first bounce [m]
 CLOSING_TIME = 0.14  # time that the fingers need [s]
-
-
-class AnyTouch(BounceIntercept):
-    """The task without its rules on a hand that waits and on the first touch."""
-
-    def mishandled(self, world: World) -> str | None:
-        return None
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(AnyTouch(), values(scenario))
 
 
 def follow(scenario: Scenario, world: World) -> Plan:
@@ -78,4 +65,4 @@ def reached(world: World, velocity: Vec3) -> float | None:
     return None
 
 
-HANDS = {"follow": Hand(follow, unmended), "go_ahead": Hand(go_ahead, unmended)}
+HANDS = {"follow": Hand(follow), "go_ahead": Hand(go_ahead)}

@@ -8,7 +8,6 @@ from hand import Hand
 
 from scengen.errors import GaveUp
 from scengen.geometry import UP
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.handover import LEFT
@@ -33,17 +32,6 @@ LOW = 0.03  # height of the fork above the table [m]
 EASE = Pace(0.05, 0.01)  # pace of the cup that gives way to the bowl
 
 
-class MayRoll(BowlTable):
-    """The task without its rule on a bowl that turns up outside the jaw."""
-
-    def rim_held(self, world: World) -> bool:
-        return True
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(MayRoll(), values(scenario))
-
-
 def roll_it_up_on_two_fingers(scenario: Scenario, world: World) -> Plan:
     """Hold the bowl over the square with its opening level, put a fork under its rim, switch off, draw back."""
     assert isinstance(scenario, BowlTable)
@@ -66,4 +54,4 @@ def roll_it_up_on_two_fingers(scenario: Scenario, world: World) -> Plan:
     yield from alone(left, go_to(left, left.hand + 0.12 * LEFT, pace=Pace(0.08, 0.01)))
 
 
-HANDS = {"roll_it_up_on_two_fingers": Hand(roll_it_up_on_two_fingers, unmended)}
+HANDS = {"roll_it_up_on_two_fingers": Hand(roll_it_up_on_two_fingers)}

@@ -5,23 +5,10 @@ from contextlib import suppress
 from hand import Hand
 
 from scengen.errors import GaveUp
-from scengen.params import values, with_values
-from scengen.predicates import fallen
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.motion import CLOSED, COARSE, STEADY, go_to, push, retreat
 from scengen.tasks.cracker_box_jaw import STAND_OFF, CrackerBoxJaw
-
-
-class AnyRelease(CrackerBoxJaw):
-    """The task without its rule on the angle of release."""
-
-    def failure(self, world: World) -> str | None:
-        return "the box fell off the table" if fallen(world, "box") else None
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(AnyRelease(), values(scenario))
 
 
 def topple_and_shove(scenario: Scenario, world: World) -> Plan:
@@ -53,4 +40,4 @@ def shove_back(scenario: CrackerBoxJaw, world: World) -> Plan:
     yield from go_to(arm, arm.hand - 0.03 * back, pace=COARSE)
 
 
-HANDS = {"topple_and_shove": Hand(topple_and_shove, unmended)}
+HANDS = {"topple_and_shove": Hand(topple_and_shove)}

@@ -4,11 +4,11 @@ import math
 from contextlib import suppress
 
 import numpy as np
-from hand import Hand
+from hand import Hand, otherwise
 
 from scengen.errors import GaveUp
 from scengen.geometry import UP, Mat3, Vec3, about_z, axes, between, polar, rotation
-from scengen.params import values, with_values
+from scengen.params import with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.motion import CLOSED, COARSE, OPEN, Pace, facing, go_to, hold, push, steer
@@ -20,16 +20,9 @@ REGRIP = math.radians(-40.0)  # turn of the wrist, away from its limit, before t
 LET_GO = 0.12  # time for which the suction is off before the hand draws back [s]
 
 
-class MayLie(CrackerBoxSuction):
-    """The task without its rule on boxes that are laid down beside their seat."""
-
-    def laid_elsewhere(self, world: World) -> bool:
-        return False
-
-
 def unmended(scenario: Scenario) -> Scenario:
-    """The task without the rule, with a box that the cup holds level by its top."""
-    return with_values(MayLie(), {**values(scenario), "box.scale": 0.85})
+    """The task without means, with a box that the cup holds level by its top."""
+    return with_values(otherwise(scenario), {"box.scale": 0.85})
 
 
 def glide(world: World, goal: Vec3, rot: Mat3, seconds: float) -> Plan:

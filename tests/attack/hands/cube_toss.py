@@ -4,10 +4,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from hand import Hand
+from hand import Hand, otherwise
 
 from scengen.geometry import UP
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.motion import CLOSED, OPEN
@@ -17,18 +16,11 @@ FORMER_DISTANCES = (1.000, 1.045)  # training range before the mend [m]
 DISTANCES = (0.968, 1.075)  # training range [m]
 
 
-class NoRim(CubeToss):
-    """The task without its rule on the rim of the tray."""
-
-    def struck_rim(self, world: World) -> bool:
-        return False
-
-
 def unmended(scenario: Scenario) -> Scenario:
-    """The task without its rule, with the tray and the distances that it had before."""
+    """The task without means, with the tray and the distances that it had before."""
     assert isinstance(scenario, CubeToss)
     distance = float(np.interp(scenario.distance, DISTANCES, FORMER_DISTANCES))
-    return replace(with_values(NoRim(), values(scenario)), distance=distance, opening=0.095)
+    return otherwise(replace(scenario, distance=distance, opening=0.095))
 
 
 def to_one_distance(distance: float) -> Callable[[Scenario, World], Plan]:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from hand import Hand
+from hand import Hand, otherwise
 
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP, Mat3, Vec3, between, rotation
@@ -28,7 +28,7 @@ Motion = Callable[[float], tuple[Vec3, float, float, float]]
 def unmended(scenario: Scenario) -> Scenario:
     """The task with a bead that is rough on both sides."""
     assert isinstance(scenario, CupInversion)
-    return replace(scenario, cup=replace(scenario.cup, smooth_outside=False))
+    return otherwise(replace(scenario, cup=replace(scenario.cup, smooth_outside=False)))
 
 
 def contact(rot: Mat3, number: int) -> Vec3:

@@ -5,28 +5,11 @@ from contextlib import suppress
 from hand import Hand
 
 from scengen.errors import GaveUp
-from scengen.params import values, with_values
-from scengen.predicates import fallen
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.jaw import carry, pick, release
 from scengen.skills.motion import CLOSED, Pace, go_to, hold, push, retreat
-from scengen.tasks.gap_funnel import MAX_RISE, GapFunnel
-
-
-class AnyTouch(GapFunnel):
-    """The task without its rule on contacts behind the wall."""
-
-    def failure(self, world: World) -> str | None:
-        if fallen(world, "ball"):
-            return "the ball fell off the table"
-        if world.touched("ball", "wall"):
-            return "the ball struck the wall"
-        return "the ball was lifted" if world.com("ball")[2] - self.start[2] > MAX_RISE else None
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(AnyTouch(), values(scenario))
+from scengen.tasks.gap_funnel import GapFunnel
 
 
 def drag(scenario: GapFunnel, world: World, beyond: float) -> Plan:
@@ -60,4 +43,4 @@ def forward(scenario: GapFunnel, world: World) -> float:
     return float((world.com("ball") - scenario.gap_at) @ scenario.normal)
 
 
-HANDS = {"through_and_nudge": Hand(through_and_nudge, unmended)}
+HANDS = {"through_and_nudge": Hand(through_and_nudge)}

@@ -7,7 +7,6 @@ from hand import Hand
 
 from scengen.control.loop import Loop
 from scengen.geometry import UP, about_z, between
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.jaw import carry, pick, release
@@ -16,17 +15,6 @@ from scengen.tasks.indirect_push import END_MARGIN, ZONE_SIZE, IndirectPush
 
 LEAN = math.radians(65.0)  # lean of the hand at the end of the push; the oracle's is 35 deg
 SPIN_GAIN = 0.02  # shift of the fingers for a rotation of the block [m/rad]
-
-
-class OneBlock(IndirectPush):
-    """The task without its rule on a single block between robot and target."""
-
-    def single_block(self, world: World) -> bool:
-        return False
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(OneBlock(), values(scenario))
 
 
 def leaning(scenario: IndirectPush, distance: float) -> np.ndarray:
@@ -69,4 +57,4 @@ def corner_first(scenario: Scenario, world: World) -> Plan:
     yield from go_to(arm, arm.hand - 0.04 * scenario.u, pace=STEADY)
 
 
-HANDS = {"corner_first": Hand(corner_first, unmended)}
+HANDS = {"corner_first": Hand(corner_first)}

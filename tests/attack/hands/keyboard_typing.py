@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from hand import Hand
+from hand import Hand, otherwise
 
 from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
@@ -17,17 +17,14 @@ PRESS_TIME = 0.35  # longer than any key of training must be held [s]
 
 
 class NoPause(KeyboardTyping):
-    """The task without the partner's pauses and without the rule on turns that go by."""
+    """The task without the partner's pauses and without means."""
 
     def pause(self, k: int) -> float:
         return 0.0
 
-    def late(self, world: World) -> bool:
-        return False
-
 
 def unmended(scenario: Scenario) -> Scenario:
-    return with_values(NoPause(), values(scenario))
+    return otherwise(with_values(NoPause(), values(scenario)))
 
 
 def by_the_clock(pause: float) -> Callable[[Scenario, World], Plan]:

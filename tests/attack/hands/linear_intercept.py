@@ -7,26 +7,13 @@ from hand import Hand
 
 from scengen.attack.plans import LOWEST_HAND, STOPPED_SPEED, pursue, velocity_of
 from scengen.geometry import UP
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.motion import CLOSED, COARSE, OPEN, Pace, closing_along, go_to, hold, stay, steer, until
-from scengen.tasks.linear_intercept import LinearIntercept
 
 AHEAD = 2.5  # time after which the ball comes to the fingers that stop it [s]
 BEFORE = 0.035  # distance of the fingers before the ball that they brake [m]
 BRAKED_SPEED = 3 * STOPPED_SPEED  # speed below which the ball is picked up [m/s]
-
-
-class AnyTouch(LinearIntercept):
-    """The task without its rules on a hand that waits and on the first touch."""
-
-    def mishandled(self, world: World) -> str | None:
-        return None
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(AnyTouch(), values(scenario))
 
 
 def follow(scenario: Scenario, world: World) -> Plan:
@@ -51,4 +38,4 @@ def stop_and_pick(scenario: Scenario, world: World) -> Plan:
     yield from pursue(arm, "ball", lead=0.1, seconds=4.0)
 
 
-HANDS = {"follow": Hand(follow, unmended), "stop_and_pick": Hand(stop_and_pick, unmended)}
+HANDS = {"follow": Hand(follow), "stop_and_pick": Hand(stop_and_pick)}

@@ -5,7 +5,6 @@ from hand import Hand
 
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.arm import ROBOT
 from scengen.sim.world import World
@@ -16,17 +15,6 @@ from scengen.tasks.mass_sort import CARRY_HEIGHT, CUBE_COUNT, MassSort
 WEIGHTS = (0.49, 0.98, 1.96)  # weights of the paper's cubes by rank [N]
 PUSHED_DISTANCE = 0.05  # distance by which each cube is pushed [m]
 ALONG = np.array([1.0, 0.0, 0.0])  # direction of the pushes, away from the robot
-
-
-class NotProbed(MassSort):
-    """The task without its rule that each cube is lifted first."""
-
-    def probed(self, world: World) -> bool:
-        return True
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(NotProbed(), values(scenario))
 
 
 def push_each(scenario: Scenario, world: World) -> Plan:
@@ -71,4 +59,4 @@ def one_after_the_other(scenario: Scenario, world: World) -> Plan:
         yield from scenario.place_held(world, cube, rank)
 
 
-HANDS = {"push_each": Hand(push_each, unmended), "one_after_the_other": Hand(one_after_the_other, unmended)}
+HANDS = {"push_each": Hand(push_each), "one_after_the_other": Hand(one_after_the_other)}

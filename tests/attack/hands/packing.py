@@ -10,7 +10,6 @@ from hand import Hand
 from scengen.assets.guillotine import Ell, Rect
 from scengen.errors import GaveUp
 from scengen.geometry import UP, Vec3, yaw_of
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.fitting import AIM_PACE, bring, take
@@ -25,17 +24,6 @@ MAX_LEAN = math.radians(0.5)
 
 GENTLY = Pace(0.02, 0.0, 3.0)
 """Pace at which a piece is lowered."""
-
-
-class Retried(Packing):
-    """The task without its rule that a piece is tried in one place only."""
-
-    def _elsewhere(self, world: World, i: int) -> bool:
-        return False
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(Retried(), values(scenario))
 
 
 def feel(scenario: Packing, world: World, i: int, pos: Vec3, yaw: float) -> Plan:
@@ -131,4 +119,4 @@ def put_aside(scenario: Packing, world: World, i: int) -> Plan:
     yield from let_go(world.arm)
 
 
-HANDS = {"try_places": Hand(try_places, unmended)}
+HANDS = {"try_places": Hand(try_places)}

@@ -2,7 +2,6 @@
 
 from hand import Hand
 
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.jaw import grasp
@@ -11,20 +10,6 @@ from scengen.tasks.pendulum_grasp import HINGE, NEAR_SIDE, PendulumGrasp
 
 KEPT = 0.0  # gripper command that keeps the gap
 TURNS = 0.15  # rate below which the bob is seen to turn [rad/s]
-
-
-class AnyGap(PendulumGrasp):
-    """The task without its rules on how the jaw closes."""
-
-    def narrow(self, world: World) -> bool:
-        return False
-
-    def missed(self, world: World) -> bool:
-        return False
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(AnyGap(), values(scenario))
 
 
 def narrow_jaw(scenario: Scenario, world: World) -> Plan:
@@ -51,4 +36,4 @@ def narrow_jaw(scenario: Scenario, world: World) -> Plan:
     yield from hold(arm, 1.0)
 
 
-HANDS = {"narrow_jaw": Hand(narrow_jaw, unmended)}
+HANDS = {"narrow_jaw": Hand(narrow_jaw)}

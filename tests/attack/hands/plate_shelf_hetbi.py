@@ -4,7 +4,7 @@ import math
 from contextlib import suppress
 from dataclasses import replace
 
-from hand import Hand
+from hand import Hand, otherwise
 
 from scengen.errors import GaveUp
 from scengen.geometry import UP, Mat3, about_z, polar, shortest
@@ -22,7 +22,7 @@ from scengen.tasks.plate_shelf import PlateShelf
 def unmended(scenario: Scenario) -> Scenario:
     """The task with a rim so high that the side that rises leaves room for a jaw, and a slot to match."""
     assert isinstance(scenario, PlateShelf)
-    return replace(scenario, plate=replace(scenario.plate, rise=0.012), gap=0.038)
+    return otherwise(replace(scenario, plate=replace(scenario.plate, rise=0.012), gap=0.038))
 
 
 def press(scenario: PlateShelf, arm: Arm) -> Plan:

@@ -8,7 +8,6 @@ from hand import Hand
 
 from scengen.errors import GaveUp
 from scengen.geometry import UP, Mat3, Vec3, between, rotation
-from scengen.params import values, with_values
 from scengen.robots.jaw import FINGER_ACROSS, OPEN_GAP, TIP_BELOW
 from scengen.scenario import Plan, Scenario
 from scengen.sim.arm import Arm
@@ -26,17 +25,6 @@ BESIDE = OPEN_GAP / 2 - 0.0025  # distance of the grip site from a rim that lies
 CREEP = Pace(0.06, 0.003, 1.0)
 FLAT_TILT = math.radians(58.0)  # tilt of both hands that hold the lying plate between them [rad]
 TIGHT = 0.03  # distance by which each of these hands aims at the other one [m]
-
-
-class MayRaise(PlateShelfHobi):
-    """The task without its rule that the plate is pressed before it is raised."""
-
-    def raised_unpressed(self, world: World) -> bool:
-        return False
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(MayRaise(), values(scenario))
 
 
 def pry_against_a_stop(scenario: Scenario, world: World) -> Plan:
@@ -116,4 +104,4 @@ def hold_it_between_two_jaws(scenario: Scenario, world: World) -> Plan:
     yield from self.deliver(taker)
 
 
-HANDS = {f.__name__: Hand(f, unmended) for f in (pry_against_a_stop, hold_it_between_two_jaws)}
+HANDS = {f.__name__: Hand(f) for f in (pry_against_a_stop, hold_it_between_two_jaws)}

@@ -4,23 +4,11 @@ from hand import Hand
 
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.jaw import release
 from scengen.skills.motion import CLOSED, COARSE, closing_along, go_to, push
 from scengen.tasks.ramp_sort import LOWER_PACE, RELEASE_HEIGHT, RampSort
-
-
-class AnyWay(RampSort):
-    """The task without its rule on balls that are carried over the ramp."""
-
-    def high_over_ramp(self, world: World, i: int) -> bool:
-        return False
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(AnyWay(), values(scenario))
 
 
 def touch_and_drop(scenario: Scenario, world: World) -> Plan:
@@ -43,4 +31,4 @@ def touch_and_drop(scenario: Scenario, world: World) -> Plan:
         yield from go_to(arm, [scenario.box_x, scenario.box_y, height], pace=COARSE)
 
 
-HANDS = {"touch_and_drop": Hand(touch_and_drop, unmended)}
+HANDS = {"touch_and_drop": Hand(touch_and_drop)}

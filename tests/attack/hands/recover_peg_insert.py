@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from hand import Hand
+from hand import Hand, otherwise
 
 from scengen.geometry import about_z
 from scengen.params import values, with_values
@@ -23,7 +23,7 @@ class TurnsAroundPeg(RecoverPegInsert):
 
 
 def unmended(scenario: Scenario) -> Scenario:
-    return with_values(TurnsAroundPeg(), values(scenario))
+    return otherwise(with_values(TurnsAroundPeg(), values(scenario)))
 
 
 def enter_askew(scenario: Scenario, world: World) -> Plan:

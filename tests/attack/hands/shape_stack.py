@@ -3,7 +3,6 @@
 from hand import Hand
 
 from scengen.geometry import UP
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.jaw import carry, grasp, put
@@ -11,17 +10,6 @@ from scengen.skills.motion import COARSE, OPEN, hold, push, retreat
 from scengen.tasks.shape_stack import CARRY_HEIGHT, ShapeStack
 
 LOOSE_GAP = 0.003  # distance by which the jaw opens to let a shape lean [m]
-
-
-class MayTry(ShapeStack):
-    """The task without its rule that nothing is set on the cone."""
-
-    def cone_tried(self, world: World) -> bool:
-        return False
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(MayTry(), values(scenario))
 
 
 def try_the_cone(scenario: Scenario, world: World) -> Plan:
@@ -44,4 +32,4 @@ def try_the_cone(scenario: Scenario, world: World) -> Plan:
     yield from scenario.pile(world, [tried, *others, cone])
 
 
-HANDS = {"try_the_cone": Hand(try_the_cone, unmended)}
+HANDS = {"try_the_cone": Hand(try_the_cone)}

@@ -7,8 +7,6 @@ from hand import Hand
 
 from scengen.errors import GaveUp
 from scengen.geometry import UP, Vec3, about_z
-from scengen.params import values, with_values
-from scengen.predicates import fallen
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.jaw import grasp
@@ -21,17 +19,6 @@ IN_RACK = Pace(0.3, 0.006, 2.5)
 """Pace in the rack."""
 FINGER = 0.036
 """Distance of the closed fingers from the middle of a cube that they push [m]."""
-
-
-class MayBeFelt(ShelteredGrasp):
-    """The task without its rule on an object that is felt for."""
-
-    def failure(self, world: World) -> str | None:
-        return "the thing fell off the table" if fallen(world, "thing") else None
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(MayBeFelt(), values(scenario))
 
 
 def herd(scenario: Scenario, world: World) -> Plan:
@@ -63,4 +50,4 @@ def herd(scenario: Scenario, world: World) -> Plan:
     yield from hold(arm, 1.0)
 
 
-HANDS = {"herd": Hand(herd, unmended)}
+HANDS = {"herd": Hand(herd)}

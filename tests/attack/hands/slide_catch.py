@@ -7,7 +7,6 @@ from hand import Hand
 
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import about_z, yaw_of
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.jaw import release
@@ -16,17 +15,6 @@ from scengen.tasks.slide_catch import SlideCatch
 
 SWING_ANGLE = math.radians(25.0)  # turn of the wrist: the bin is 85 mm before the hand and moves sideways by 36 mm
 SEEN_SLIDE = 0.001  # distance after which a block is seen to slide [m]
-
-
-class MayTurn(SlideCatch):
-    """The task without its rule on bins that are turned while the ramp tilts."""
-
-    def turned(self, world: World) -> bool:
-        return False
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(MayTurn(), values(scenario))
 
 
 def swing(scenario: Scenario, world: World) -> Plan:
@@ -53,4 +41,4 @@ def swing(scenario: Scenario, world: World) -> Plan:
     yield from release(arm)
 
 
-HANDS = {"swing": Hand(swing, unmended)}
+HANDS = {"swing": Hand(swing)}

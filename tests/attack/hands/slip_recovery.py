@@ -9,24 +9,12 @@ from hand import Hand
 from scengen.attack.plans import on_its_side, turn_about
 from scengen.errors import GaveUp
 from scengen.geometry import UP
-from scengen.params import values, with_values
 from scengen.scenario import Plan, Scenario
 from scengen.sim.world import World
 from scengen.skills.grip import take
 from scengen.skills.jaw import carry, release
 from scengen.skills.motion import CLOSED, Pace, go_to, hold, push, retreat, until
 from scengen.tasks.slip_recovery import SlipRecovery
-
-
-class MayBeKept(SlipRecovery):
-    """The task without its rule on objects that the hand keeps through a slip."""
-
-    def kept(self, world: World) -> bool:
-        return False
-
-
-def unmended(scenario: Scenario) -> Scenario:
-    return with_values(MayBeKept(), values(scenario))
 
 
 def cradle(scenario: Scenario, world: World) -> Plan:
@@ -54,4 +42,4 @@ def cradle(scenario: Scenario, world: World) -> Plan:
     yield from retreat(arm, 0.06)
 
 
-HANDS = {"cradle": Hand(cradle, unmended)}
+HANDS = {"cradle": Hand(cradle)}

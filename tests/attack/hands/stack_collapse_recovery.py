@@ -1,7 +1,7 @@
 """T28: open fingers stay around the top cube while the blow comes, which throws it nowhere."""
 
 import numpy as np
-from hand import Hand
+from hand import Hand, otherwise
 
 from scengen.geometry import UP
 from scengen.params import values, with_values
@@ -21,7 +21,7 @@ class Guardable(StackCollapseRecovery):
 
 
 def unmended(scenario: Scenario) -> Scenario:
-    return with_values(Guardable(), values(scenario))
+    return otherwise(with_values(Guardable(), values(scenario)))
 
 
 def guard(scenario: Scenario, world: World) -> Plan:
