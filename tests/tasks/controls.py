@@ -147,6 +147,11 @@ def not_certified(task: Task, scenario: Scenario, check: str, says: str = "") ->
     return certificate
 
 
+def missed(scenario: Scenario, world: World, mean: str) -> bool:
+    """Whether a mean, if it is open, is missed in the present state."""
+    return scenario.means()[mean].found(world) == MISSED
+
+
 def refuted(scenario: Scenario) -> str:
     """Expect that a constraint refutes the scenario, with finite numbers; returns its reason."""
     refutation = scenario.infeasible()
