@@ -14,6 +14,7 @@ from functools import cache
 import mujoco
 
 from scengen.certificate import Certificate
+from scengen.means import MISSED
 from scengen.samplers.task import Task
 from scengen.scenario import Plan, Planner, Refutation, Scenario, Shortcut
 from scengen.sim import scene_text
