@@ -9,8 +9,9 @@
         o agent
 
 Bottleneck: every letter has its turn and its owner. The agent must infer whose turn it is: from the word and the bold
-letters, or from the colours of the caps, which alone give word and places (72 of 72 in training). It must keep away from the keyboard in the partner's turn, hit one key of 26 with a finger 26 mm wide, and
-keep it down until it counts. No key takes a letter back.
+letters, or from the colours of the caps, which alone give word and places (72 of 72 in training). It must keep away
+from the keyboard in the partner's turn, hit one key of 26 with a finger 26 mm wide, and keep it down until it counts.
+No key takes a letter back.
 
 Decisions, where the paper (App. B, M02) is silent, or contradicts itself (one arm in App. B.1, two in App. B):
 
