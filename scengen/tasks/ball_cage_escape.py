@@ -8,9 +8,7 @@
 
 Bottleneck: the stool blocks the hole, so that no tilt helps before the cage is lifted. The lifted cage must be tilted
 towards the hole, past the angle at which the ball rolls: tan(tilt) = rolling resistance (5.7 deg nominally). The robot
-must know on which side of the ball the hole is; of two ends, a guess is right in half of the scenes. In training two
-facts reveal it without a look at the hole: the side of the stool's middle, and the end farther from the ball (12 of 12
-each).
+must know on which side of the ball the hole is; of two ends, a guess is right in half of the scenes.
 
 Decisions. The paper gives the story, no numbers. (1) The ball resists rolling like one of soft foam: a tenth of its
 load. So it stays where it is in a cage that is lifted and carried level, by up to 1 m/s^2, and comes to rest on the
@@ -21,7 +19,8 @@ to tilt the cage both ways. As the ball leaves, the jaw holds the cage off stool
 knocked off its stool, or slid until the hole is beside it. The cage is then tilted towards the hole, by `SHAKE_TILT`
 more than the ball needs to roll: otherwise a shake, or a stop, would do. A tilt slower than 12 deg/s may let the ball
 out below that angle. With the hole in the middle (`ball_beyond`), a cage that is slid off its stool in the hand is as
-good as lifted.
+good as lifted. (5) In training two facts reveal the way without a look at the hole, and both are fair: the side of the
+stool's middle, and the end farther from the ball (12 of 12 each).
 """
 
 import math

@@ -8,13 +8,14 @@ r"""T09 cracker-box-jaw: lay a cracker box that stands upright flat into a slot,
 
 Bottleneck: no hand lets the box down flat into the slot. The hand can reach a box that leans with its far end in the
 slot, as flat as the palm permits. Released there, or from a level hand, the box is caught on the near wall. It must be
-shifted there until it drops in, for which the box' length leaves 3 mm. This needs no second look: one knock at a place
-that follows from the slot alone is fair and solves 12 of 12, on `tight` too.
+shifted there until it drops in, for which the box' length leaves 3 mm.
 
 Decisions, where the paper (App. B, T09) says no more than "tight slot outline" and "partially insert":
 
 * The slot and the box are those of T08 (`assets.cracker_box`), the box no thicker than the jaw opens. Its thickness is
   the "narrow side": across its width, "the flat side", no jaw reaches.
+* The box that lies on the near wall needs no look: one knock at a place that follows from the slot alone is fair and
+  solves 12 of 12, on `tight` too.
 * A box that falls beside the slot is not a failure: it lies flat, with nothing that a jaw reaches around.
 * The box is let go at most `MAX_RELEASE_ANGLE` steep. Stood up in the slot and toppled, it comes in by gravity alone,
   and a few shoves finish it (12 of 12). A held box may stand in the slot at any angle.

@@ -10,13 +10,14 @@
                     #
 
 Bottleneck: the ball lies beside the gap's axis, and the hand must stop at the wall. So the robot must first bring the
-ball before the gap, and then send it along the axis, fast enough to roll as far as the zone by itself. The ball need
-not rest in between: drawn to the axis and thrown by a jaw that opens at 0.26 m/s, it arrives in 12 of 12. That is fair.
+ball before the gap, and then send it along the axis, fast enough to roll as far as the zone by itself.
 
 A ball that rolls slows down by 5/7 c g, where c is its rolling resistance: at speed v it rolls 7 v^2 / (10 c g).
 
 Decisions where the paper (App. B, T21) is silent:
 
+* The ball need not rest before the gap: drawn to the axis and thrown along it by a jaw that opens at 0.26 m/s, it
+  arrives in 12 of 12. That is fair.
 * The gap is seen, not felt for. A badly aimed ball could roll along the wall until it finds the gap, or be tried again;
   closed fingers that slid along the wall to a jamb found it in 12 of 12.
 * The ball may be held, but not lifted: over the wall no gap is needed. The wall is so high that the palm cannot pass

@@ -8,10 +8,9 @@
        \\
         o agent
 
-Bottleneck: every letter has its turn and its owner. The agent must infer whose turn it is: from the word and the bold
-letters, or from the colours of the caps, which alone give word and places (72 of 72 in training). It must keep away
-from the keyboard in the partner's turn, hit one key of 26 with a finger 26 mm wide, and keep it down until it counts.
-No key takes a letter back.
+Bottleneck: every letter has its turn and its owner. From the word, or the colours of the caps, and from the bold
+letters the agent must infer whose turn it is. It must keep away from the keyboard in the partner's turn, hit one key of
+26 with a finger 26 mm wide, and keep it down until it counts. No key takes a letter back.
 
 Decisions, where the paper (App. B, M02) is silent, or contradicts itself (one arm in App. B.1, two in App. B):
 
@@ -26,6 +25,7 @@ Decisions, where the paper (App. B, M02) is silent, or contradicts itself (one a
 * A letter is typed when an arm touches its key, and no other, for `hold` without a break. A shorter touch is allowed.
   Holding a key that is not next, or the other's, or several at once ends the episode. No goal counts after contact of
   the arms. A typed key must be released before it counts again.
+* The colours of the caps alone give word and places (72 of 72 in training), without the word. That is fair.
 * The keyboard lies loose on the table: an arm that drags it moves the keys. The paper gives no lengths.
 * The agent does not know how long `hold` is. A letter that becomes bold shows that the press was long enough.
 """

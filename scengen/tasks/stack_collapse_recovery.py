@@ -9,8 +9,7 @@
 
 Bottleneck: no plan made before the blow holds. Whether one cube or two fall, to which side, how far and on which face
 is known only once they are at rest. Then the robot must find the cubes and build from below. Putting the top cube back
-where it stood is right in half of the scenarios. Which cubes still stand need not be seen: the middle one on the
-bottom one, then the top one on the middle one, is always right, and fair.
+where it stood is right in half of the scenarios.
 
 Decisions, where the paper (App. B, T28) says "an external impulse knocks over the stack" and "rebuild a stable stack":
 
@@ -19,6 +18,8 @@ Decisions, where the paper (App. B, T28) says "an external impulse knocks over t
   comes when the tower has stood untouched for a hidden time, so holding the tower only delays it. So does a hand that
   is low beside the tower, which the paper lacks: open fingers stopped a top cube that was struck alone, and a plan made
   before the blow sufficed. Afterwards a tower counts only if its top cube has lain on the table.
+* Which cubes still stand need not be seen: the middle one on the bottom one, then the top one on the middle one, is
+  right whatever fell, and fair.
 * "In different directions": the top cube falls to the left and the middle one to the right; on an axis the other way
   round. The robot stands in front of the tower: it reaches both sides equally well, but not far behind or before it.
 * "Mass distribution": a cube over the middle of a larger one cannot tip, because its centre of mass is over the larger
