@@ -19,7 +19,7 @@ Decisions, where the paper (App. B, T28) says "an external impulse knocks over t
   is low beside the tower, which the paper lacks: open fingers stopped a top cube that was struck alone, and a plan made
   before the blow sufficed. Afterwards a tower counts only if its top cube has lain on the table.
 * Which cubes still stand need not be seen: the middle one on the bottom one, then the top one on the middle one, is
-  right whatever fell, and fair.
+  always right, and fair.
 * "In different directions": the top cube falls to the left and the middle one to the right; on an axis the other way
   round. The robot stands in front of the tower: it reaches both sides equally well, but not far behind or before it.
 * "Mass distribution": a cube over the middle of a larger one cannot tip, because its centre of mass is over the larger
