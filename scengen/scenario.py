@@ -61,7 +61,7 @@ class Answer:
     """Function that decides by statics, without a simulation, whether a guess is right; None if only a rollout can
     decide."""
     tries: int = 3
-    """Number of guesses that an episode allows, at most three; 1 if a wrong guess ends the episode."""
+    """Number of guesses that an episode allows, at most three; 1 if no goal counts after a wrong guess."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class Scenario(abc.ABC):
         return None
 
     def means(self) -> Mapping[str, Mean]:
-        """What the intended solution does, by a name that completes "the goal was reached, but not: ...".
+        """What the intended solution does, by a name that completes "the goal was reached otherwise, it lacks: ...".
 
         A success that lacks one of them is a success otherwise. Facts measure contacts, holds, rests, orders and
         heights rather than places of the hand, which can be imitated. See `scengen.means`.

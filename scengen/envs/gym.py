@@ -164,8 +164,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             action_repeat: control periods for which an action is held, 4 for data of 25 Hz. The controller, the events,
                 the goal and the filter keep running at 100 Hz; the filter gets the same action several times. The
                 time limit in seconds does not change. A step ends early if the episode ends.
-            rules: "strict", those of the certificates, or "paper", without the failures that the paper lacks
-                (docs/paper.md).
+            rules: "strict", those of the certificates: a goal counts if it was reached by the means of the task; or
+                "paper": it counts however it was reached (docs/means.md).
 
         Raises:
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown; pictures that are

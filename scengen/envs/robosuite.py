@@ -116,7 +116,8 @@ class RobosuiteEnv(ManipulationEnv):
             gripper_types: "default" for the hands of the task; other hands are refused.
             control_freq: actions per second.
             horizon: actions in an episode. Default: the task's time limit.
-            rules: "strict", those of the certificates, or "paper", without the failures that the paper lacks.
+            rules: "strict", those of the certificates: a goal counts if it was reached by the means of the task; or
+                "paper": it counts however it was reached.
             action_filter: None, the paper's interface for policies; or "teleop" for the filter of teleoperation and of
                 the oracles, which is defined for 100 Hz.
             reward_scale: reward of a reached goal.

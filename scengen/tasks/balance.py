@@ -15,14 +15,15 @@ Decisions where the paper (App. B, T31 and T32) is silent:
 * The rod starts upright on the table, so that the jaw takes it at its upper end. The paper gives no sizes.
 * The paper's policies suffer from a displaced centre of mass (4.3). Here a plate of lead in one side of the rod
   displaces it. The dark side shows where it is, its thickness how far, and the weight confirms it; nothing is hidden.
-  In training the middle of the foot may be over the ridge. On the axis `off_centre` it may not: the foot must be set
-  off the ridge's middle, or turned until the dark side looks along the ridge.
+  In training the middle of the foot may be over the ridge: a policy that never looks at the lead solves 12 of 12. On
+  the axis `off_centre` it may not: the foot must be set off the ridge's middle, or turned until the dark side looks
+  along the ridge.
 * Only the ridge may touch the rod for 1 s, and for a further second without action: a rod that leans on a finger, on
   the plate or on the ridge's side does not stand on the ridge.
-* A rod that is released and tips by more than 10 deg is lost. So is one that stood on the ridge by itself for 0.1 s and
-  is touched again: a hand that opens a little, sees the rod tip and catches it would find the place by trial.
-* A rod that falls from more than 6 mm is lost: a rod that is aligned and dropped from 60 mm stays up on 12 mm. The
-  paper requires a release on the ridge, and lacks these three rules.
+* The rod is released once, upright and at rest. A hand that opens a little, sees the rod tip and catches it would find
+  the place by trial.
+* Released on the ridge (paper) means that the rod falls from no more than 6 mm: a rod that is aligned and dropped from
+  60 mm stays up on 12 mm.
 """
 
 import math

@@ -8,18 +8,19 @@
 
 Bottleneck: the stool blocks the hole, so that no tilt helps before the cage is lifted. The lifted cage must be tilted
 towards the hole, past the angle at which the ball rolls: tan(tilt) = rolling resistance (5.7 deg nominally). The robot
-must see on which side of the ball the hole is; of two ends, a guess is right in half of the scenes.
+must know on which side of the ball the hole is; of two ends, a guess is right in half of the scenes.
 
 Decisions. The paper gives the story, no numbers. (1) The ball resists rolling like one of soft foam: a tenth of its
 load. So it stays where it is in a cage that is lifted and carried level, by up to 1 m/s^2, and comes to rest on the
 table. (2) The jaw holds the cage across its width, the one edge that it can span; walls are translucent so that
 cameras see the ball. (3) The stool is fixed: a tipping one would be another task. (4) The paper lets a policy try until
-the ball falls out. The strict rules do not. A ball that rolls to the end without the hole is lost, so that it does not
-help to tilt the cage both ways. When the ball leaves the cage, the hand must hold the cage off stool and table:
-otherwise the cage could be knocked off its stool, or slid until the hole is beside it. The cage must then be tilted
-towards the hole, by `SHAKE_TILT` more than the ball needs to roll: otherwise a shake, or a stop, would do. A tilt
-slower than 12 deg/s may let the ball out below that angle. With the hole in the middle (`ball_beyond`), a cage that is
-slid off its stool in the hand is as good as lifted.
+the ball falls out. Here no goal counts after the ball has rolled to the end without the hole, so that it does not help
+to tilt the cage both ways. As the ball leaves, the jaw holds the cage off stool and table: otherwise the cage could be
+knocked off its stool, or slid until the hole is beside it. The cage is then tilted towards the hole, by `SHAKE_TILT`
+more than the ball needs to roll: otherwise a shake, or a stop, would do. A tilt slower than 12 deg/s may let the ball
+out below that angle. With the hole in the middle (`ball_beyond`), a cage that is slid off its stool in the hand is as
+good as lifted. (5) In training two facts reveal the way without a look at the hole, and both are fair: the side of the
+stool's middle, and the end farther from the ball (12 of 12 each).
 """
 
 import math

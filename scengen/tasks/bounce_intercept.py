@@ -18,13 +18,13 @@ Decisions, where the paper (App. B, T13) is silent:
   slips, and ends with 2/7 of the speed before and 5/7 of that after it, which is not a mirror image at all. That is an
   axis.
 * The walls take 12 to 20 % of the speed in training, like fresh cushions; a bounce takes 22 ms.
-* The hand may be anywhere, also between the walls. If it touches the ball before the ball has met a wall, the episode
-  is lost: that catch would be another task (T12). "Above the table" means 4 cm higher than before, as there.
-* Strict rules that the paper lacks (`launched_ball`). The hand waits within 25 mm of where it is when the ball leaves
-  the last wall, and the first touch is the catch. Otherwise T12 after the bounce was enough: a hand that followed the
-  ball caught 8 of 12, and one that went ahead on its straight line 11 of 12; now 0 of 12. A policy may still correct
-  its place for the speed that the wall took. "The catchable zone" of the paper starts 6 cm from the walls: a hand that
-  followed a slow ball up to a wall (axis `dead_walls`) was in its place when the ball left it.
+* The hand may be anywhere, also between the walls. A catch before the ball has met a wall would be another task (T12).
+  "Above the table" means 4 cm higher than before, as there.
+* The hand waits within 25 mm of where it is when the ball leaves the last wall, and the first touch is the catch
+  (`launched_ball`). Otherwise T12 after the bounce is enough: a hand that followed the ball caught 8 of 12, and one
+  that went ahead on its straight line 11 of 12, none by the means. A policy may still correct its place for the speed
+  that the wall took. "The catchable zone" of the paper starts 6 cm from the walls: a hand that followed a slow ball up
+  to a wall (axis `dead_walls`) was in its place when the ball left it.
 * Aims, places and both sides are drawn so widely that no place serves many: after a bounce, 16 % of the balls come
   within 20 mm of the best one, between open fingers that are turned the right way there. A hand that hovers over the
   best of many places, and moves 25 mm after the bounce, catches 10 of 60.

@@ -7,9 +7,8 @@
       |_____________|
 
 Bottleneck: one hand alone cannot do it. The jaw spans the dome only where the dome is too flat to be pinched, and no
-finger fits between the dome and the ring. The cup, on the foot, can pull the bowl out, but no hand turns up from below:
-with the cup the opening never looks higher than level. So the bowl is handed over in the air, and each hand turns it by
-about a right angle. A failed attempt ends the episode.
+finger fits between the dome and the ring. The cup, on the foot, can pull the bowl out, but must let go of the foot on
+which the bowl is to stand. So the bowl is handed over in the air, and each hand turns it by about a right angle.
 
 Decisions, where the paper (App. B, T07) says no more than "bowl", "rack" and "goal position":
 
@@ -18,11 +17,12 @@ Decisions, where the paper (App. B, T07) says no more than "bowl", "rack" and "g
   on its side the cup could turn the bowl by a right angle more.
 * The goal position is a green square: the bowl's foot must stand in it, upright within 8 deg, released.
 * "Some failed handovers accidentally invert the bowl and still lead to successful upright placement" (App. J): a bowl
-  that is put down on its side rocks upright by itself. Here such an accident ends the episode: while the bowl leans by
-  more than 30 deg, only hands may touch it, except for the rack in which it is upside down. A bowl that falls faster
+  that is put down on its side rocks upright by itself. Here no goal counts after such an accident: while the bowl leans
+  by more than 30 deg, only hands may touch it, except for the rack in which it is upside down. A bowl that falls faster
   than 0.40 m/s, as from 8 mm, breaks.
-* A bowl that the cup lays on two open fingers rolls upright between them, and the cup eases it down to the table. So
-  while the opening looks up from the side, by more than a cup can turn it, the rim is between the closed fingers.
+* The jaw turns the bowl up. A bowl that the cup lays on two open fingers rolls upright between them, and the cup eases
+  it down to the table. The cup can even swing the bowl up about a point beside the rim, to 2.6 deg from upright, stand
+  it on half-open fingers and take its floor from above (12 of 12). Both are labelled: the jaw never holds the rim.
 * The paper ships two sizes of bowls and gives no lengths. Training has soup bowls; larger and smaller ones are axes.
 
 The oracle reads the place of the rim and the bowl's tilt when it needs them: the bowl shifts on the cup by millimetres
@@ -60,8 +60,8 @@ from ..skills.waiting import at_most, elapsed
 
 UPRIGHT_TOLERANCE = math.radians(8.0)  # largest tilt of a bowl that stands [rad]
 FALL_ANGLE = math.radians(30.0)
-"""Largest tilt of a bowl that may touch anything but a hand [rad]: it tips over at 35 deg and more."""
-TURNED_UP = math.radians(75.0)  # largest tilt of a bowl that only the jaw can have turned: the cup gets to 85 deg [rad]
+"""Largest tilt of a bowl that may touch bodies other than hands [rad]: it tips over at 35 deg and more."""
+TURNED_UP = math.radians(75.0)  # tilt below which the jaw must bear the bowl [rad]: the handover is near 90 deg
 RIM_REACH = 0.015  # largest distance of the rim from the grip site of a jaw that holds it [m]
 MAX_FALL_SPEED = 0.40  # speed of a fall above which the bowl breaks [m/s]
 RIM_CLEARANCE = 0.004  # gap between the rim and the ring [m]

@@ -7,17 +7,18 @@ r"""T09 cracker-box-jaw: lay a cracker box that stands upright flat into a slot,
     ------+-----\______/-+--   16 deg, and is knocked home.
 
 Bottleneck: no hand lets the box down flat into the slot. The hand can reach a box that leans with its far end in the
-slot, as flat as the palm permits. Released there, or from a level hand, the box is caught on the near wall. The policy
-must see it there, and shift it until it drops in, for which the box' length leaves 3 mm.
+slot, as flat as the palm permits. Released there, or from a level hand, the box is caught on the near wall. It must be
+shifted there until it drops in, for which the box' length leaves 3 mm.
 
 Decisions, where the paper (App. B, T09) says no more than "tight slot outline" and "partially insert":
 
 * The slot and the box are those of T08 (`assets.cracker_box`), the box no thicker than the jaw opens. Its thickness is
   the "narrow side": across its width, "the flat side", no jaw reaches.
-* A box that falls beside the slot is not a failure by rule: it lies flat, with nothing that a jaw reaches around.
-* A strict rule that the paper lacks: a box that touches the slot, steeper than `MAX_RELEASE_ANGLE` and not touched by
-  the robot, loses the episode. Stood up in the slot and toppled, the box comes in by gravity alone, and a few shoves
-  finish it (12 of 12). A held box may stand in the slot at any angle. The rule closes a way, it opens none.
+* The box that lies on the near wall needs no look: one knock at a place that follows from the slot alone is fair and
+  solves 12 of 12, on `tight` too.
+* A box that falls beside the slot is not a failure: it lies flat, with nothing that a jaw reaches around.
+* The box is let go at most `MAX_RELEASE_ANGLE` steep. Stood up in the slot and toppled, it comes in by gravity alone,
+  and a few shoves finish it (12 of 12). A held box may stand in the slot at any angle.
 * One arm, as in the catalogue (App. B.1); the text has a second one, which is frozen.
 """
 

@@ -16,10 +16,10 @@ Decisions, where the paper (App. B, T08) says no more than "a horizontal slot fi
 * The slot is a pocket with the outline of the broad face, in which the box lies flat: only then is the broad face the
   right one, and the descent "uniform". A cup's lip on a side face ends at least 30 mm under the upper edge, so that the
   slot's wall stops the cup while the box has 1 to 2 cm left to fall.
-* If a corner of the box goes down faster than 0.35 m/s, as of a box that falls from 6 mm, its crackers break and the
-  episode is lost: neither knocking it over nor dropping it is a way. No hand lowers anything faster than 0.3 m/s.
-* A small box that is held by its top in the air stays on the cup: laid askew on the slot's walls and let go, it shows
-  its broad face upwards. So a box that leans or lies anywhere but in the slot may not be let go.
+* If a corner of the box goes down faster than 0.35 m/s, as of a box that falls from 6 mm, its crackers break: neither
+  knocking it over nor dropping it is a way. No hand lowers anything faster than 0.3 m/s.
+* The cup lays the box down by a broad face. A small box that is held by its top in the air stays on the cup: laid askew
+  on the slot's walls and let go, it shows its broad face upwards.
 * One arm, as in the catalogue (App. B.1); the text has a second one, which is frozen.
 """
 

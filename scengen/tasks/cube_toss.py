@@ -24,10 +24,10 @@ Decisions, where the paper (App. B, T10) is silent or contradicts itself:
 * The paper gives no distances, and speaks of a goal zone. All of the table is within reach, so the zone is on the
   floor. A cube that falls from 1.1 m tumbles on where it lands, so the zone is a tray with walls, which faces the
   robot.
-* A cube that touches the rim of the tray is lost. The paper has no such rule. Without it a cube that comes down 2 cm
-  beside the middle tips in over the rim, and one fixed swing turned to the tray solves every distance. With it the cube
-  must come down within 7 mm of the middle along the throw. Distances are spread over 11 cm, so that the best single
-  distance, thrown as precisely as by the oracle, solves one draw in seven (measured: 11 of 80 at five distances).
+* The cube comes down inside the tray, not on its rim. Otherwise a cube that comes down 2 cm beside the middle tips in
+  over the rim, and one fixed swing turned to the tray solves every distance. So the cube must come down within 7 mm of
+  the middle along the throw. Distances are spread over 11 cm, so that the best single distance, thrown as precisely as
+  by the oracle, solves one draw in seven (measured: 11 of 80 at five distances).
 * There is one throw: a cube on the floor is out of reach, and lost.
 * On an axis of ours the tray rides on a rail around the robot, from a moment that the robot does not know: the same
   throw, to the place where the tray will be. "Comes to rest inside the goal zone" then means relative to the tray.

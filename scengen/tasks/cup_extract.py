@@ -11,7 +11,8 @@ Bottleneck: the block is out of reach of the hand from every direction. It leave
 beyond level by the angle of friction on its wall, and only the handle allows that turn:
 
 * The wall is so thin that the jaw's springs exert almost no force when the fingers close on it (`pinch`): friction
-  there bears less than the weight of cup and block. The handle is thick.
+  there bears less than the weight of cup and block. The handle is thick. The wall still lets a jaw lean the cup on the
+  table; a block that leaves a cup that is not held in the air is labelled.
 * Fingers that open inside the cup slide out of it: they taper more than the friction of the wall holds.
 * A pushed cup slides: its friction on the table is less than the distance of its centre of mass from the edge over its
   height, also towards the handle.

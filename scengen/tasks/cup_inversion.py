@@ -21,8 +21,8 @@ Decisions, where the paper (App. B, T04) is silent:
   does not hold on it: else a level hand could take the cup by its wall, with the other hand behind it as a stop, and
   roll.
 * "Toppling is not a reliable option since the cup just slides out": the rim's friction on the table is less than its
-  radius over the cup's height. A cup that touches the table askew, or falls faster than a hand lowers it, is lost: else
-  it could be laid down for the jaw, or be dropped from a hand that points up.
+  radius over the cup's height. No goal counts after the cup touched the table askew or fell faster than a hand lowers
+  it: else it could be laid down for the jaw, or be dropped from a hand that points up.
 * In the region means that the whole base is on the square, upright within 8 deg, and released.
 """
 
@@ -58,7 +58,7 @@ UPRIGHT_TOLERANCE = math.radians(8.0)  # largest tilt of a cup that counts as up
 FALL_ANGLE = math.radians(25.0)  # tilt above which a cup that touches the table is no longer upright [rad]
 INVERTED_ANGLE = math.radians(155.0)  # tilt above which a cup that touches the table counts as upside down [rad]
 MAX_FALL_SPEED = 0.5
-"""Speed of a fall above which the cup is lost [m/s], as from 13 mm: no hand lowers anything faster than 0.3 m/s. It is
+"""Speed above which the cup has fallen [m/s], as from 13 mm: no hand lowers anything faster than 0.3 m/s. It is
 checked every 10 ms, in which a fall gains 0.1 m/s: from 19 mm on it is seen for certain."""
 LEFTWARDS: Mat3 = facing(math.pi / 2, 0.0)
 """Orientation of the suction hand, level, in which it points at the other arm."""

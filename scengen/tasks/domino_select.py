@@ -18,10 +18,9 @@ Decisions:
 * "The wrong target": the outermost chain on one side leads to a separate blue slab, which never counts. So colour
   identifies this chain and nothing else.
 * Each scene has one chain of each of the paper's defects (gap, drift, wrong target) and a fourth with a gap or a drift.
-* One try: the robot may touch one first tile and nothing else, and may topple it but not carry it; anything else ends
-  the episode. Touching a wrong first tile is not a failure: the goal can no longer be reached, so every wrong chain is
-  judged by physics alone. Each certificate topples each wrong chain as the oracle topples the right one, until
-  everything is at rest.
+* One try: the robot touches one first tile and nothing else, and topples it but does not carry it. Touching another
+  body does not end the episode, but no goal counts after it. Every wrong chain is judged by physics: each certificate
+  topples each of them as the oracle topples the right one, until everything is at rest.
 * Chance: the intact chain is each of the four that lead to the red slab equally often, and the others are dealt at
   random. A policy that sees only colours, and one that always chooses the same lane in the middle, are right in 1 of 4
   scenes. The side of the decoy carries no further information.

@@ -7,9 +7,9 @@ Bottleneck: the robot pushes one tile only, and each falling tile must reach the
 
 Decision: the paper forbids touching the slab and nothing else. It notes (App. on task-specific behaviours) that
 policies then knock over a tile in the middle instead of the first. Pushing the last tile solves almost every scene that
-way, without a causal chain. Here the robot may touch the first tile and no other, and may topple it but not carry it: a
-first tile carried in the jaw could knock over the slab or the last tile. Breaking a rule ends the episode. The paper's
-canonical plan keeps all rules; the shortcuts below verify that each bypass fails.
+way, without a causal chain. Here a goal counts if the robot touched the first tile alone, toppled it and did not carry
+it: a first tile carried in the jaw could knock over the slab or the last tile. This is the paper's canonical plan; the
+shortcuts below verify that each bypass fails.
 """
 
 import math

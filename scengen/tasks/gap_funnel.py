@@ -10,18 +10,20 @@
                     #
 
 Bottleneck: the ball lies beside the gap's axis, and the hand must stop at the wall. So the robot must first bring the
-ball to rest in front of the gap, and then push it: straight, and fast enough to roll as far as the zone by itself.
+ball before the gap, and then send it along the axis, fast enough to roll as far as the zone by itself.
 
 A ball that rolls slows down by 5/7 c g, where c is its rolling resistance: at speed v it rolls 7 v^2 / (10 c g).
 
 Decisions where the paper (App. B, T21) is silent:
 
-* A ball that strikes the wall ends the episode. Otherwise a badly aimed ball could roll along the wall until it finds
-  the gap, or be tried again.
+* The ball need not rest before the gap: drawn to the axis and thrown along it by a jaw that opens at 0.26 m/s, it
+  arrives in 12 of 12. That is fair.
+* The gap is seen, not felt for. A badly aimed ball could roll along the wall until it finds the gap, or be tried again;
+  closed fingers that slid along the wall to a jamb found it in 12 of 12.
 * The ball may be held, but not lifted: over the wall no gap is needed. The wall is so high that the palm cannot pass
   over it while the jaw holds the ball on the table.
-* The robot may not touch the ball once its centre is beyond the middle of the wall. The paper has no such rule; it is
-  ours. The hand's narrow side, 63 mm, fits through the gap: a ball could be dragged through in the jaw and nudged on.
+* No hand touches the ball beyond the middle of the wall. The hand's narrow side, 63 mm, fits through the gap: a ball
+  could be dragged through in the jaw and nudged on.
 * "Outside the robot's workspace" is beyond a bound that no posture of the arm exceeds (`panda.REACH`).
 * A kerb behind the zone stops a ball that is too fast. Without it the speed would have to be right to 8 %, and the
   speed of a ball that a finger pushes scatters by 10 %: it rolls ahead of a hand that moves unevenly.
@@ -233,7 +235,7 @@ class GapFunnel(Scenario):
         yield from release(world.arm)
 
     def answer(self) -> Answer:
-        """Place of the gap along y [m]. One try: a ball beside it strikes the wall."""
+        """Place of the gap along y [m]. One try: no goal counts after a ball has struck the wall."""
 
         def act(world: World, place: float) -> Plan:
             yield from self.align(world, self.gap_at - self.before * self.normal + (place - self.gap_y) * self.tangent)

@@ -18,17 +18,20 @@ Decisions, where the paper (App. B, T20) is silent or cannot be taken literally:
   is deep enough for target, zone and the way between them only towards the corners, which gives the bearing: 20 deg.
   Scenarios are refuted unless *no part of the gripper* can touch the target in any posture (`ik.GRIPPER_REACH`).
 * One block must not be enough: the zone starts beyond what the arm at full stretch reaches with one, by the triangle
-  inequality and without search. Two are enough in training. If the zone is farther or the blocks are smaller, three are
-  needed so that the arm is not stretched to its limit.
-* A push, not a blow: the target may move only while a chain of touching blocks leads from the hand to it. If it slides
-  on by itself faster than 80 mm/s, it is lost. Without this rule, an arm driven through its full stretch jumped and
-  shot the block before it at 0.6 m/s at the target, and one block moved the target anywhere. A block that was knocked
-  on repeatedly, each time some millimetres beyond the hand's reach, brought it into the zone in a dozen knocks.
-* A block that the robot touches may not touch the target. The paper has no such rule, but says that a chain is needed.
-  The bound above holds for a block that is pushed square. A block that is pushed corner first reaches 0.41 edges
-  farther, and brought the target into the zone in a third of the training draws.
+  inequality and without search. Two are enough in training. If the zone is farther or the blocks are smaller, a hand
+  that leans by 35 deg, as the oracle's does, needs three so that the arm is not stretched to its limit. A hand that
+  leans by 65 deg does it with two (`far_zone` 12 of 12, `small_blocks` 8 of 12).
+* In training one bearing, 19.5 deg, serves every scene (12 of 12). So do one end of the push, two blocks, and block 2
+  at the head. Target and zone need no look there, the blocks do.
+* A push, not a blow: the target moves while a chain of touching blocks leads from the hand to it, and slides on by
+  itself no faster than 80 mm/s. Otherwise an arm driven through its full stretch jumped and shot the block before it at
+  0.6 m/s at the target, and one block moved the target anywhere. A block that was knocked on repeatedly, each time some
+  millimetres beyond the hand's reach, brought it into the zone in a dozen knocks.
+* No block touches robot and target at once; the paper says that a chain is needed. The bound above holds for a block
+  that is pushed square. A block that is pushed corner first reaches 0.41 edges farther, and brought the target into the
+  zone in a third of the training draws.
 * The target is in the zone if its middle is over it, on the table and at rest, for 0.3 s, 30 steps as in the paper's
-  T12 and T13. Touching the target loses the episode: only blocks may touch it.
+  T12 and T13. Only blocks touch it.
 * Anything else may be done with the blocks. A block that is held in the jaw reaches less far than one that is pushed.
 """
 

@@ -8,9 +8,9 @@
        \\
         o agent
 
-Bottleneck: every letter has its turn and its owner. From the word and from the bold letters, the agent must infer whose
-turn it is. It must keep away from the keyboard in the partner's turn, hit one key of 26 with a finger 26 mm wide, and
-keep it down until it counts. No key takes a letter back.
+Bottleneck: every letter has its turn and its owner. From the word, or the colours of the caps, and from the bold
+letters the agent must infer whose turn it is. It must keep away from the keyboard in the partner's turn, hit one key of
+26 with a finger 26 mm wide, and keep it down until it counts. No key takes a letter back.
 
 Decisions, where the paper (App. B, M02) is silent, or contradicts itself (one arm in App. B.1, two in App. B):
 
@@ -19,12 +19,13 @@ Decisions, where the paper (App. B, M02) is silent, or contradicts itself (one a
   types, when it is its turn, if the agent's hand is `MIN_CLEARANCE` beside the keyboard, then goes home to its own
   side. If the agent comes back before the letter counts, the partner turns round and waits again.
 * The partner pauses before each of its turns, for a time that is unknown to the agent. An agent whose hand stays beside
-  the keyboard for `TURN_LIMIT` in its own turn has let its turn go by, and the episode ends. The paper has neither. The
-  two close turn-taking by the clock, without a look at the partner or at the bold letters: the best fixed wait fits a
-  quarter of the turns, and in training there are two in a word. The partner's motion reveals a turn, too.
+  the keyboard for `TURN_LIMIT` in its own turn has let its turn go by, and no goal counts any more. The paper has
+  neither. The two close turn-taking by the clock, without a look at the partner or at the bold letters: the best fixed
+  wait fits a quarter of the turns, and in training there are two in a word. The partner's motion reveals a turn, too.
 * A letter is typed when an arm touches its key, and no other, for `hold` without a break. A shorter touch is allowed.
-  Holding a key that is not next, or the other's, or several at once ends the episode, and so does contact of the arms.
-  A typed key must be released before it counts again.
+  Holding a key that is not next, or the other's, or several at once ends the episode. No goal counts after contact of
+  the arms. A typed key must be released before it counts again.
+* The colours of the caps alone give word and places (72 of 72 in training), without the word. That is fair.
 * The keyboard lies loose on the table: an arm that drags it moves the keys. The paper gives no lengths.
 * The agent does not know how long `hold` is. A letter that becomes bold shows that the press was long enough.
 """
@@ -153,7 +154,7 @@ class KeyboardTyping(Scenario):
             memory["waited"] += Loop.PERIOD
 
     def late(self, world: World) -> bool:
-        """Whether the agent has stayed beside the keyboard for too long in its own turn; the paper has no such rule."""
+        """Whether the agent has stayed beside the keyboard for too long in its own turn. The paper has no limit."""
         k = int(world.memory["typed"])
         return k < len(self.letters) and self.owns(k) and world.memory["waited"] > TURN_LIMIT
 

@@ -1,13 +1,12 @@
 """Base of the tasks in which a ball is launched and caught (T12, T13): launch, goal, and moves that meet the ball.
 
-Two strict rules that the paper lacks make the robot predict. Its plan is the same: position the gripper at the
-predicted place, close it as the ball arrives.
+The means are the plan of the paper: position the gripper at the predicted place, close it as the ball arrives.
 
 * The hand waits for the ball. From the moment at which `may_move` becomes false until the first touch, it moves by at
-  most 25 mm, seen from above; the oracle moves by 0 to 23 mm. Otherwise a hand that followed the ball caught 10 of 12
-  in T12 and 8 of 12 in T13.
-* The first touch is the catch: within 0.3 s the ball is between the pads. The oracle needs 0.07 s at most, also in
-  jittered runs. Otherwise closed fingers stopped the ball, and picked it up at rest, in 12 of 12.
+  most 25 mm, seen from above; the oracle moves by 0 to 23 mm. A hand that followed the ball caught 10 of 12 in T12 and
+  8 of 12 in T13.
+* The first touch is the catch: within 0.1 s the ball is between the pads. The oracle needs 0.07 s at most, also in
+  jittered runs. Closed fingers that stopped the ball picked it up at rest in 12 of 12.
 """
 
 import abc

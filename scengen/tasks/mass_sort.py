@@ -5,16 +5,16 @@
 
         (?)      (?)     (?)
 
-Bottleneck: only the wrist can measure the mass of a cube; nothing shows it. A cube that is released in a wrong zone
-loses the episode (paper, App. B, T25).
+Bottleneck: no camera shows the mass of a cube; it is felt. A cube that is released in a wrong zone loses the episode
+(paper, App. B, T25).
 
 Decisions where the paper is silent:
 
-* A strict rule, which the paper states as a plan only ("each cube must be probed before placement"): a cube that is
-  released in a zone loses the episode unless each cube has been lifted by `PROBE_HEIGHT` in the hand before. Without
-  it, a policy sorts the cubes by their resistance to a push (12 of 12), or puts one after the other down in its final
-  place, the last one by deduction from the fixed set of masses (12 of 12). The rule closes these ways, it opens none.
-  It does not check what a policy reads from its wrist.
+* "Each cube must be probed before placement": each is lifted by `PROBE_HEIGHT` in the hand before the first is
+  released in a zone. Otherwise a policy sorts the cubes by their resistance to a push (12 of 12), or puts one after the
+  other down in its final place, the last one by deduction from the fixed set of masses (12 of 12).
+* How a policy weighs is free. A hand with a zero action sinks by the mass within a second, so its position suffices,
+  without a sense of force. With one cube weighed, training's four orders leave 3 of 4.
 * Left is the robot's left. The zones carry one, two and three bars, and the instruction refers to the bars.
 * The cubes never lie in their final order, left to right: then no weighing would be needed.
 * Chance: training has four orders, so one fixed answer is right in a quarter of it.

@@ -18,11 +18,13 @@ Decisions, where the paper (App. B, M01) is silent, and its text contradicts its
 * App. B turns frames by 180 deg; App. J says in one place that they are flipped horizontally. Training uses the first,
   the other is an axis.
 * "Lift the cube to a small height": 4 cm above its place on the table, as in robosuite's Lift, held by the robot and by
-  nothing else for 0.3 s, 30 steps as in the paper's T12 and T13. There is no other rule. The time limit of 12 s lets a
-  policy see the hand go the wrong way and turn back: noticing that is what the task requires, so it is not a bypass.
+  nothing else for 0.3 s, 30 steps as in the paper's T12 and T13. The time limit of 12 s lets a policy see the hand go
+  the wrong way and turn back: noticing that is what the task requires, so it is not a bypass.
 * A miss costs nothing but time. A hand that closes where the picture shows the cube, feels nothing, and goes to the
   opposite place lifts the cube at 8 s (12 of 12, on `flipped` with one more try 4 of 4). The task asks a policy to
-  notice the turned frame before or after a miss; a success does not show which.
+  notice the turned frame before or after a miss; a success does not show which. A palm that sweeps the table until the
+  wrist feels the cube lifts it without a picture (27 of 36). That is labelled: the cube is not between the fingers when
+  the robot first touches it.
 * The cube stands at least 7 cm from the middle lines of the view: else some orientation shows it where it is.
 
 Axes. The paper has none. Those of `view` test the eye alone: memory, which has none, cannot distinguish them from

@@ -7,8 +7,8 @@
 
                      [patch]
 
-Bottleneck: the colour of a cube is visible only once its lid is off, and nothing else distinguishes the cubes.
-Releasing another cube on the patch loses the episode, so the robot must look before it brings a cube there.
+Bottleneck: the colour of a cube is visible only once its lid is off, and nothing else distinguishes the cubes. No goal
+counts after another cube came onto the patch, so the robot must look before it brings a cube there.
 
 A lid is twice as wide as the jaw opens and lies flat, 25 mm above the table: it has nothing to grasp. It is pushed off
 its cube. The open jaw does that best: one finger on either side pushes the lid straight, and the cube passes between
@@ -19,8 +19,7 @@ Decisions where the paper (App. B, T26) is silent:
 
 * Hidden means: no camera of the table sees any part of a cube. That is exact, not sampled: a flat lid hides a cube if
   its foot, projected from the camera onto the lid's underside, lies within the lid.
-* Another cube is wrong if it stands on the patch and is not held. The paper has no such rule; without one, a policy
-  could bring cube after cube until one of them counts.
+* No other cube stands on the patch, held or not. Otherwise a policy could bring cube after cube until one counts.
 * Chance: training has three places for the red cube; a policy that always uncovers the same one is right in a third.
 * The paper's axis stacks two or three lids more on the target. Here every cube gets as many, because a single pile
   would mark the target.
@@ -255,7 +254,7 @@ class OccluderPush(Scenario):
         yield from self.deliver(world, i)
 
     def answer(self) -> Answer:
-        """Place of the red cube. One try: another cube on the patch ends the episode."""
+        """Place of the red cube. One try: no goal counts after another cube on the patch."""
         numbers = tuple(float(i) for i in range(CUBE_COUNT))
         return Answer(
             numbers,

@@ -1,10 +1,10 @@
 """Base of the two tasks with a plate and a shelf (T05, T06): the scene, the goal, and how a held plate is put in.
 
-* A plate that falls faster than 0.35 m/s, as from 6 mm, breaks, and the episode is lost. No hand lowers anything faster
+* A plate that falls faster than 0.35 m/s, as from 6 mm, breaks: no goal counts any more. No hand lowers anything faster
   than 0.3 m/s. Speeds are checked every 10 ms, in which a fall gains 0.1 m/s: from 10 mm on it is seen for certain.
   The shelf is polished, so that a plate that is released in the slot does fall.
-* A plate that lies and comes within 6 cm of the table's edge is lost: beyond the edge a palm has space, and one jaw
-  would take the rim there. The plate is glazed and its rim is low, so that no jaw takes it where it lies: a hand over
+* A plate that lies stays 6 cm from the table's edge: beyond the edge a palm has space, and one jaw would take the rim
+  there. The plate is glazed and its rim is low, so that no jaw takes it where it lies: a hand over
   the table that reaches the rim is steep, and its pads slip off.
 * In the slot means: on edge within 10 deg, along the slot, the plate's middle between the dividers, its rim on the
   slot's floor, and released. Leaning against the shelf from outside does not count.

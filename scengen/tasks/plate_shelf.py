@@ -8,7 +8,7 @@
 Bottleneck: one hand alone cannot do it. The jaw cannot take the plate from the table: a hand level with the lip would
 have its palm under the table. The cup takes the plate by its broad face, but cannot follow it between the dividers. So
 the cup lifts the plate and holds it out, the jaw takes the lip, the cup lets go, and the jaw turns the plate on edge
-and puts it in. A failed attempt ends the episode: a plate that is dropped breaks.
+and puts it in. A failed attempt cannot be repaired: a plate that is dropped breaks.
 
 Decisions, where the paper (App. B, T05 and T06) says no more than "cutlery plate", "slot" and "incline":
 
@@ -25,6 +25,9 @@ Decisions, where the paper (App. B, T05 and T06) says no more than "cutlery plat
   slot, lets go, and rolls it in.
 * A plate that falls breaks: else the cup could drop it the rest of the way, from 10 mm on. `plate_and_slot` holds what
   else the two tasks with a plate share.
+* The jaw takes the plate while the cup holds it, and lowers it. A cup on the lip can also stand the plate on edge in
+  the slot, clamp it between lip and divider by switching off, and let it slip by pulses of 20 ms, the jaw parked
+  (12 of 12). That is labelled.
 """
 
 import math

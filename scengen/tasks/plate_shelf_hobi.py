@@ -8,7 +8,7 @@ r"""T05 plate-shelf-hobi: stand a plate on edge in the slot of a shelf, with two
 
 Bottleneck: no jaw takes the plate from the table, because the palm of a hand level with the rim would be under it. A
 second arm has to press the plate until the first one holds the raised rim, and has to leave before the plate is turned
-on edge. A failed attempt ends the episode: a plate that falls breaks.
+on edge. A failed attempt cannot be repaired: a plate that falls breaks.
 
 Decisions, where the paper (App. B, T05) says no more than "cutlery plate", "slot" and "slight incline":
 
@@ -17,12 +17,13 @@ Decisions, where the paper (App. B, T05) says no more than "cutlery plate", "slo
 * The plate is glazed. A hand over the table that grips the rim of a flat plate is steeper than 60 deg. Two pads hold a
   rim that slopes by s and is askew to them if the difference is less than twice the angle of friction: at a friction of
   0.6 they do, at 0.3 they slip off. A single finger under the rim does not lift it either; it pushes the plate away.
-* If something stops the plate, or a palm has space beside the table, one arm could lift the rim. So a plate that comes
-  within 6 cm of the table's edge is lost, and so is one that knocks against the shelf: only a plate on edge, over the
-  slot, may touch it. Nor can the plate be laid down on the shelf, to be taken there by its rim.
+* If something stops the plate, or a palm has space beside the table, one arm could lift the rim. So the plate stays
+  6 cm from the table's edge, and touches the shelf only on edge, over the slot. Nor can it be laid down on the shelf,
+  to be taken there by its rim.
 * The paper lets one arm press, so that the plate tilts. A stop beyond its far side and a finger under its rim lift it
-  as well, and so do two jaws that grip opposite sides and squeeze, though each alone slips off. So until the plate has
-  turned by half its incline, a hand may touch no side of it but the one that goes down, nor lift it off the table.
+  as well (11 of 12), and so do two jaws that grip opposite sides and squeeze, though each alone slips off (5 of 12). So
+  until the plate has turned by half its incline, hands touch only the side that goes down, and the plate stays on the
+  table.
 * The slot is longer than the plate is wide: two hands that squeeze the plate between them lift it, but do not get
   between the dividers with it. The dividers are lower than the plate, so that the fingers on its upper rim are free.
 * The arm that is farther from the shelf presses. In training that is the right one.

@@ -21,9 +21,8 @@ Decisions, where the paper (App. B, T02) is silent:
 * When "the peg aligns with the slot": its axis is within `ALIGN_ANGLE` of the slot's, its nose within `SIDE_TOLERANCE`
   of the slot's axis and as near to a mouth as `distance` says, on either side of the board. A larger angle does not
   pass the slot, and without the turn no goal counts.
-* A strict rule that the paper lacks: a peg that is partly in the board does not turn it. A nose that came in askew and
-  was squared up inside would turn the board around the inserted peg, with nothing to recover (12 of 12). Such a peg
-  must come out again. The rule closes a way, it opens none.
+* A peg that is partly in the board does not turn it. A nose that came in askew and was squared up inside would turn the
+  board around the inserted peg, with nothing to recover (12 of 12). Such a peg must come out again.
 * The slot has walls only at both ends. In a channel the walls square a compliant arm: a peg that was only shifted, not
   turned, went in 6 times out of 6. Between two windows nothing squares it.
 * "95 % of its length": this share of the peg is beyond the mouth, with its middle within the slot. Up to 103 % counts,
@@ -31,6 +30,8 @@ Decisions, where the paper (App. B, T02) is silent:
 * Tipping the peg over and grasping it again is one way, and not demanded: the goal counts. The oracle grasps the peg
   from the side with a level hand, near its foot, and lays it level in the air by turning the hand down.
 * The direction of the turn is hidden until it happens: re-aiming blindly to one side is right in half of the scenarios.
+  A peg that is stopped on the wrong side and re-aimed to the other goes in (12 of 12). That is labelled: after the turn
+  neither hand nor peg feels for the window.
 
 The oracle uses feedback: it steers the nose by the present poses of peg and slot, and waits while the nose is out of
 line. This corrects a peg that sits askew in the jaw, a board that has turned, and disturbances alike.

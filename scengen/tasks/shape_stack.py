@@ -15,10 +15,12 @@ frustum. Decisions where the paper (App. B, T30) is silent:
 * A stack has one shape on each. Two shapes beside each other on a third, which a wide one supports, are not a stack.
 * All shapes stand on a flat face at the start. The frustum is always among them: without it any order would do.
 * The frustum has a straight foot for the jaw and ends in a tip: with a wide face it would be a base like any other.
-* A shape that is released and topples loses the episode, and so does one that is set on the frustum, in the hand or
-  not. Otherwise a policy could try what stands on what: a jaw that opens by 3 mm feels a shape lean on it, and closes
-  again. Or it could lay the frustum on its side, where two of its faces are parallel enough.
-* Chance: the shape at one fixed place is the right one for the top in a third of training.
+* Shapes stay upright, and nothing is set on the frustum, in the hand or not. Otherwise a policy could try what stands
+  on what: a jaw that opens by 3 mm feels a shape lean on it, and closes again. Or it could lay the frustum on its side,
+  where two of its faces are parallel enough.
+* Chance: the shape at one fixed place is the right one for the top in a third of training. The frustum is also the
+  narrowest shape, the highest one and the only one of its colour: a policy that puts the narrowest or the highest last
+  is right in 12 of 12, without asking what stands on what. No axis breaks narrowest or colour.
 """
 
 import math
@@ -47,7 +49,7 @@ from ..skills.jaw import pick, put
 from ..skills.motion import OPEN, Pace, closing_along, go_to, hand_yaw, retreat
 
 FALL_ANGLE = math.radians(30.0)
-"""Tilt at which a released shape is lost [rad]. The feet of an overhanging shape let it lean by 5 deg; a shape 52 mm
+"""Tilt at which a shape has toppled [rad]. The feet of an overhanging shape let it lean by 5 deg; a shape 52 mm
 high and 44 mm wide tips over its edge at 40 deg."""
 MAX_DROP_SPEED = 0.35  # speed of a shape in the air above which it falls [m/s]: as of a fall from 6 mm
 SLOPE_MARGIN = math.radians(10.0)

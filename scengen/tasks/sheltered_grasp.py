@@ -22,11 +22,13 @@ Decisions, where the paper (App. B, T03) is silent:
   looks down on the roof of either rack. A scene in which any line of sight ends at the object is refuted.
 * The storey and the object's place in it are geometry, which no label reveals: the robot must look into one storey,
   then into the other. The paper calls this exploring. So there is no `answer`.
-* Exploring is looking. Without a strict rule of ours, closed fingers that sweep each storey drive the object to a place
-  where the jaw takes it, blind (32 of 48). So the robot may not touch it in the rack more than 25 mm beside the hand.
-  A blind jaw that tries three places of a storey, or of both, still finds it in 11 to 18 of 48 scenes, for the opening
-  between the rack's ends is not much wider than the hand. A rack of 50 cm would leave 10 of 60, but there an approach
-  that is learned relative to the object would serve turned racks, too.
+* Exploring is looking: the object is between the fingers at the first touch, and the jaw closes in the rack on nothing
+  else. Otherwise closed fingers that sweep each storey drive the object to a place where the jaw takes it (32 of 48),
+  or feel for it with short thrusts (32 of 48). A blind jaw that closes at three places one after the other finds it in
+  11 to 18 of 48 scenes. These are labelled, unless the first place is right. The opening between the rack's ends is not
+  much wider than the hand. In a rack of 50 cm three places would leave 10 of 60, but there an approach that is learned
+  relative to the object would serve turned racks, too.
+* The tray needs no look in training: one fixed place serves 82 % of the scenes.
 * Dropped in the tray: its middle is between the tray's walls, and it touches the tray and nothing else, at rest, for
   0.3 s, 30 steps as in the paper's T12 and T13. Raking it out of the rack and grasping it on the table counts: it came
   out of the open side, too.

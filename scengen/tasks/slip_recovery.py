@@ -12,18 +12,20 @@ Decisions, where the paper (App. B, T27) says "once during transport, the grippe
 and "sliding the object is not allowed":
 
 * Transport means: carried at least `MIN_LIFT` above where the object stood. An object 1 cm above the table stays
-  between the fingers when they open, and is held again when they close. From `MIN_LIFT` it is lost: a jaw that points
-  down holds an object at most 31 mm below its highest point, where the palm starts, and its tips end 9 mm below. Once
-  the object has fallen by the sum, its top is below the tips. The slip comes at a distance from the place where the
+  between the fingers when they open, and is held again when they close. From `MIN_LIFT` on it falls clear of a jaw that
+  points down, which holds an object at most 31 mm below its highest point, where the palm starts, and whose tips end 9
+  mm below. Once the object has fallen by the sum, its top is below the tips. A level hand with the wrist turned over
+  holds a raised object with its foot just above the table, and closes on it again after the slip (23 of 24). That is
+  labelled: the object stands between the fingers when it lands. The slip comes at a distance from the place where the
   object was first so high, seen from above, and no goal counts before it, so creeping along lower or letting the slip
   happen on the spot gains nothing. The distance is hidden and has a wide range, and the object's narrow side is along
   the way: a hand that comes down blindly where objects fall on average comes down beside it or on it, and there is no
   time for a second attempt.
 * During the window the gripper ignores its command and is open; afterwards it obeys. The window lasts longer than the
   fall; scenarios with shorter ones are refuted.
-* A strict rule that the paper lacks: the episode is lost if the robot touches the object at the end of a slip, unless
-  the object has lain on the table untouched in the meantime. A hand on its side, with one finger below the object,
-  keeps it through the slip, and nothing is left to recover. The rule closes this way, it opens none.
+* The object falls out of the hand: no goal counts if the robot touches it at the end of a slip, unless it has lain on
+  the table untouched in the meantime. A hand on its side, with one finger below the object, keeps it through the slip,
+  and nothing is left to recover.
 * Placed means: lifted again after the last slip, and released in the region, at rest. An object that falls into the
   region is not placed.
 * The paper names no YCB object. These are proxies, solids of their size, mass and balance with printed labels
@@ -73,7 +75,7 @@ FALL_TIME = 0.02 + math.sqrt(2 * (PALM_ABOVE + TIP_BELOW) / GRAVITY)
 """Time from the start of a slip until the object is below the finger tips [s]: 20 ms until its release, then free
 fall."""
 FLIGHT_DISTANCE = 0.018
-"""Distance along the way that an object flies when it is lost at the oracle's pace [m]: 16 to 22 mm measured."""
+"""Distance along the way that an object flies when it slips at the oracle's pace [m]: 16 to 22 mm measured."""
 MAX_FLIGHT_DISTANCE = 0.03  # distance that is allowed for this flight [m]
 MIN_CARRY_DISTANCE = 0.015
 """Least distance that the object is carried before a slip, and that remains after the last one [m]."""

@@ -8,16 +8,18 @@
     --+-----+--    -->  --+-+-----+-----+-----+---+-- -->-+-----+--
 
 Bottleneck: no plan made before the blow holds. Whether one cube or two fall, to which side, how far and on which face
-is known only once they are at rest. Then the robot must see which cubes still stand and build from below. Putting the
-top cube back where it stood is right in half of the scenarios.
+is known only once they are at rest. Then the robot must find the cubes and build from below. Putting the top cube back
+where it stood is right in half of the scenarios.
 
 Decisions, where the paper (App. B, T28) says "an external impulse knocks over the stack" and "rebuild a stable stack":
 
 * The goal is the tower that stood: the same cubes in the same order, anywhere, at rest and untouched for a second.
 * The blow is an impulse through the centre of mass of each cube that it throws down, within one control period. It
   comes when the tower has stood untouched for a hidden time, so holding the tower only delays it. So does a hand that
-  is low beside the tower (a strict rule that the paper lacks): open fingers stopped a top cube that was struck alone,
-  and a plan made before the blow sufficed. Afterwards a tower counts only if its top cube has lain on the table.
+  is low beside the tower, which the paper lacks: open fingers stopped a top cube that was struck alone, and a plan made
+  before the blow sufficed. Afterwards a tower counts only if its top cube has lain on the table.
+* Which cubes still stand need not be seen: the middle one on the bottom one, then the top one on the middle one, is
+  always right, and fair.
 * "In different directions": the top cube falls to the left and the middle one to the right; on an axis the other way
   round. The robot stands in front of the tower: it reaches both sides equally well, but not far behind or before it.
 * "Mass distribution": a cube over the middle of a larger one cannot tip, because its centre of mass is over the larger

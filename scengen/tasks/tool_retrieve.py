@@ -16,9 +16,10 @@ the cube in any posture. The bound ignores joint limits (`ik.GRIPPER_REACH`), so
 
 The goal. The paper's "lift the cube above the table" has no numbers. Here: 4 cm above its height on the table, as in
 robosuite's Lift; held by the robot and by nothing else, with the hook released ("set the hook down, then grasp the cube
-and lift"), for 0.3 s, 30 steps as in the paper's T12 and T13. There is no other rule: a policy may push, sweep or
-throw. The place of the cube is not a secret either, because a hook swept along the far edge brings it from anywhere. So
-there is no `answer` to guess. A hook that falls off the table is lost, but may have done its work before.
+and lift"), for 0.3 s, 30 steps as in the paper's T12 and T13. How the hook draws the cube nearer is free: a policy may
+push, sweep or throw. The place of the cube is not a secret either: a hook swept along the far edge, and then drawn in,
+brings it from anywhere, without a look at the cube until it has been drawn in (24 of 24). So there is no `answer` to
+guess. A hook that falls off the table may have done its work before.
 """
 
 import math
