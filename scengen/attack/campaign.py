@@ -13,8 +13,9 @@ from ..pool import Pool, PoolRow
 from ..pool.files import sha256
 from ..pool.names import Name
 from ..samplers.task import Task
-from ..scenario import Plan, Scenario
+from ..scenario import Answer, Plan, Scenario
 from ..sim.world import World
+from ..validate.certify import lower_bound
 from ..validate.identity import source_sha256
 from ..validate.playable import scene_errors
 from ..validate.rebuilt import rebuild, world_of
@@ -24,11 +25,12 @@ from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
 from ..work.plain import read_plain, why_not_plain
 from ..work.targets import write
-from .adversary import LEAKS, PRIOR, RATED, TIERS, Attack, AttackResult, UntriedShortcut, never
+from .adversary import LEAKS, PRIOR, RANDOM, RATED, TIERS, Attack, AttackResult, UntriedShortcut, never
 from .evidence import Hit, TierRate, rates, unsound
 from .experience import Experience, experience, feasible
 from .player import Player
 from .priors import AnswerJudge, Prior, by_statics, fit, has_statics
+from .variations import FOREIGN
 
 MAX_HIT = 100_000_000
 """Size of the largest file of a hit that is read [bytes]: an hour of two arms has 20 MB."""
@@ -46,6 +48,12 @@ FITTING_SEED = 1_000_003
 """Offset from the seed of the attack to the seed of the draws on which fixed answers are fitted."""
 FRESH_SEED = 2_000_003
 """Offset from the seed of the attack to the seed of the draws on which fixed answers are measured."""
+LIMITS = {RANDOM: 0.10, FOREIGN: 0.10, f"{PRIOR}_1": 0.10, f"{PRIOR}_3": 0.20}
+"""Largest share of successes of plans that need no look at the scene, by name of the rate (CONTRIBUTING.md)."""
+CHOICE_MARGIN = 0.05
+"""Share by which a fixed answer may exceed chance in a choice among few."""
+PLANS = {RANDOM: "random plans", FOREIGN: "witnesses of other scenarios"}
+"""Plans that have a limit, as text; the others are fixed answers."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +143,31 @@ class AttackReport:
     def refuting(self) -> list[Hit]:
         """Hits that bypass the point of the task."""
         return [hit for hit in self.hits if hit.refutes]
+
+    def above_limits(self, answer: Answer | None) -> Iterator[tuple[str, bool]]:
+        """Limits of what plans may solve that need no look at the scene, as far as they are exceeded.
+
+        Args:
+            answer: the answer that the family declares. In a choice among k, n answers may solve n/k plus 5 points.
+
+        Yields:
+            The rate and its limit as text, and whether the rate's lower 95 % bound exceeds the limit, too.
+        """
+        counts = {rate.tier: (0, 0) for rate in self.rates}
+        for rate in self.rates:
+            hits, rollouts = counts[rate.tier]
+            counts[rate.tier] = hits + rate.hits, rollouts + rate.rollouts
+        for prior in self.priors:
+            if prior.fresh is not None:
+                counts[f"{PRIOR}_{len(prior.values)}"] = round(prior.fresh * prior.draws), prior.draws
+        for name, limit in LIMITS.items():
+            hits, runs = counts.get(name, (0, 0))
+            tier, _, number = name.partition("_")
+            if tier == PRIOR and answer is not None:
+                limit = max(limit, int(number) / len(answer.candidates) + CHOICE_MARGIN)
+            if runs and hits / runs > limit:
+                what = PLANS.get(tier, f"{number} fixed answer{'s' * (number != '1')}")
+                yield f"{what} solve {hits} of {runs}, more than {limit:.0%}", lower_bound(hits, runs) > limit
 
     def plain(self) -> dict[str, Any]:
         """The report as plain data, without actions, folder and processor time."""

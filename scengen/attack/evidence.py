@@ -80,11 +80,13 @@ class Hit:
     """Rules under which it reaches the goal."""
     task_version: int | None = None
     """Version of the task that was attacked; None in hits of earlier releases, which do not store it."""
+    otherwise: str = ""
+    """Means that it lacks, joined by semicolons. Under the strict rules none is lacking."""
 
     @property
     def refutes(self) -> bool:
         """Whether the hit bypasses the point of the task; if not, it only shows that the goal is accessible."""
-        return bool(self.lacks)
+        return bool(self.lacks or self.otherwise)
 
     @property
     def name(self) -> str:
@@ -93,7 +95,8 @@ class Hit:
 
     def __str__(self) -> str:
         contacts = " without " + ", ".join(f"{one} - {other}" for one, other in self.lacks) if self.lacks else ""
-        return f"by {self.tier}, {spelled(self.raw)},{contacts}: {self.plan}"
+        otherwise = f" [lacks: {self.otherwise}]" if self.otherwise else ""
+        return f"by {self.tier}, {spelled(self.raw)},{contacts}{otherwise}: {self.plan}"
 
     def plain(self) -> dict[str, Any]:
         """All fields but actions and parameters, as plain data."""
@@ -137,7 +140,7 @@ def _plain_hit(about: Any) -> dict[str, Any]:
     Raises:
         ValueError: one of them is missing, unknown, or not what a hit has.
     """
-    about = {"task_version": None, **check_mapping("what it says", about)}
+    about = {"task_version": None, "otherwise": "", **check_mapping("what it says", about)}
     known = [one.name for one in fields(Hit) if one.name != "actions"]
     for name in known:
         demand(name in about, f"it lacks {name}")
@@ -147,6 +150,7 @@ def _plain_hit(about: Any) -> dict[str, Any]:
     check_match("tier", about["tier"], WORD)
     demand(isinstance(about["raw"], bool), "raw is neither true nor false")
     check_text("plan", about["plan"], 10_000)
+    check_text("otherwise", about["otherwise"], 10_000)
     demand(_is_number(about["seconds"]) and 0 <= about["seconds"] <= MAX_HORIZON, "seconds is not a time")
     check_match("digest", about["digest"], SHORT_HASH)
     check_text("task", about["task"], 100)
@@ -189,8 +193,10 @@ def unsound(hit: Hit, task: Task) -> str:
         return OTHER_SCENARIO
     world = world_of(scenario, task.embodiment)
     again = replay(scenario, world, hit.actions, task.horizon, SETTLE_TIME, rules=hit.rules)
-    if again.solved:
+    if again.solved and (again.lacks == hit.otherwise or hit.task_version != task.version):
         return ""
+    if again.solved:
+        return f"it says that it lacks {hit.otherwise or 'no mean'}, and lacks {again.lacks or 'none'}"
     other = task.other_version("found on", hit.task_version)
     return f"its actions do not reach the goal: {again.reason}{other and f' ({other})'}"
 
@@ -263,6 +269,7 @@ def hit(
         actions=played.actions,
         rules=player.rules,
         task_version=player.scenario.VERSION,
+        otherwise=again.lacks,
     )
 
 
