@@ -52,7 +52,7 @@ LIMITS = {RANDOM: 0.10, FOREIGN: 0.10, f"{PRIOR}_1": 0.10, f"{PRIOR}_3": 0.20}
 """Largest share of successes of plans that need no look at the scene, by name of the rate (CONTRIBUTING.md)."""
 CHOICE_MARGIN = 0.05
 """Share by which a fixed answer may exceed chance in a choice among few."""
-PLANS = {RANDOM: "random plans", FOREIGN: "witnesses of other scenarios"}
+PLANS = {RANDOM: "random plans solve", FOREIGN: "witnesses of other scenarios solve"}
 """Plans that have a limit, as text; the others are fixed answers."""
 
 
@@ -166,8 +166,8 @@ class AttackReport:
             if tier == PRIOR and answer is not None:
                 limit = max(limit, int(number) / len(answer.candidates) + CHOICE_MARGIN)
             if runs and hits / runs > limit:
-                what = PLANS.get(tier, f"{number} fixed answer{'s' * (number != '1')}")
-                yield f"{what} solve {hits} of {runs}, more than {limit:.0%}", lower_bound(hits, runs) > limit
+                what = PLANS.get(tier, "1 fixed answer solves" if number == "1" else f"{number} fixed answers solve")
+                yield f"{what} {hits} of {runs}, more than {limit:.0%}", lower_bound(hits, runs) > limit
 
     def plain(self) -> dict[str, Any]:
         """The report as plain data, without actions, folder and processor time."""

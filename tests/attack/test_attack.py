@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -10,11 +11,11 @@ import pytest
 from scengen import load_task
 from scengen.attack import draws
 from scengen.attack.adversary import RANDOM, RETRY, Attack
-from scengen.attack.campaign import AttackSettings, attack, drawn, player_of
+from scengen.attack.campaign import AttackReport, AttackSettings, attack, drawn, player_of
 from scengen.attack.evidence import CausalContacts, Hit, TierRate, hit, rates
 from scengen.attack.macros import Macro
 from scengen.attack.player import Attempt, Player
-from scengen.attack.priors import fit
+from scengen.attack.priors import Prior, fit
 from scengen.attack.solids import handles, sides
 from scengen.attack.variations import at_another_pace, perturbed, phase, rest
 from scengen.cli.program import run
@@ -28,7 +29,7 @@ TASK = load_task("domino_single")
 
 
 def with_hole(self, world):
-    """The rules of the task without the one that the first tile may not be carried."""
+    """Rules in place of the means: the robot may touch the first tile alone, and may carry it."""
     if world.touched(ROBOT, "slab"):
         return "the robot touched the slab"
     return touched_only(world, "tile_0")
@@ -36,7 +37,7 @@ def with_hole(self, world):
 
 @pytest.fixture(scope="module", autouse=True)
 def hole():
-    with mock.patch.object(TASK.family, "failure", with_hole):
+    with mock.patch.multiple(TASK.family, failure=with_hole, means=lambda self: {}):
         yield
 
 
@@ -202,6 +203,43 @@ def test_fixed_answers_are_the_best_ones_together():
     assert (one.values, one.fitted, one.fresh) == ((2.0,), 0.4, 0.25)
     assert two.values == (2.0, 1.0) and two.fitted == 0.7
     assert three.values == (2.0, 1.0, 4.0) and three.fresh == 0.5 and three.bound < 1.0
+
+
+@pytest.mark.parametrize(
+    ("tier", "hits", "choices", "said"),
+    [
+        ("random", 64, 9, [("random plans solve 64 of 200, more than 10%", True)]),
+        ("random", 22, 9, [("random plans solve 22 of 200, more than 10%", False)]),
+        ("foreign", 20, 9, []),
+        ("prior_1", 64, 3, []),
+        ("prior_1", 64, 9, [("1 fixed answer solves 64 of 200, more than 16%", True)]),
+        ("prior_3", 90, 9, [("3 fixed answers solve 90 of 200, more than 38%", False)]),
+        ("servo", 200, 9, []),
+    ],
+)
+def test_what_needs_no_look_has_limits(tier, hits, choices, said):
+    counts = (TierRate(tier, False, 100, hits // 2), TierRate(tier, True, 100, hits - hits // 2))
+    report = AttackReport("task", 1, "strict", (), counts, (), (), (), (), Path(), 0.0)
+    answer = Answer(tuple(map(float, range(choices))), lambda world, value: iter(()))
+    assert list(report.above_limits(answer)) == said
+
+
+def test_fixed_answers_by_statics_count_before_rollouts():
+    report = AttackReport(
+        "task",
+        1,
+        "strict",
+        (),
+        (TierRate("prior_1", False, 5),),
+        (),
+        (Prior((0.3,), 0.5, 0.4, 300),),
+        (),
+        (),
+        Path(),
+        0.0,
+    )
+    answer = Answer(tuple(np.linspace(0.0, 1.0, 21)), lambda world, value: iter(()))
+    assert list(report.above_limits(answer)) == [("1 fixed answer solves 120 of 300, more than 10%", True)]
 
 
 # --- the command ----------------------------------------------------------------------------------
