@@ -56,7 +56,8 @@ class Episode:
         self.outcome: Outcome | None = None
         """Outcome so far; None while it is open. A later failure turns a success into a failure."""
         self.reason = ""
-        """Reason why the episode is not a success; empty while the outcome is open, and for a success."""
+        """Reason why the episode is not a success, or means that a success lacks; empty for a success by the means, and
+        while the outcome is open."""
         self.held = 0.0
         """Time for which the goal has held without interruption [s]."""
         self.lacks = ""
@@ -103,10 +104,8 @@ class Episode:
     def _reach(self) -> None:
         """Judge a goal that has been reached: unless the rules are the paper's, it must be reached by the means."""
         self.lacks = self._means.lacking()
-        if self.lacks and self.rules == STRICT:
-            self.outcome, self.reason = "failure", f"{OTHERWISE}: {self.lacks}"
-        else:
-            self.outcome = "success"
+        self.reason = f"{OTHERWISE}: {self.lacks}" if self.lacks else ""
+        self.outcome = "failure" if self.lacks and self.rules == STRICT else "success"
 
     def settled(self) -> tuple[Outcome, str]:
         """The final outcome and its reason, after the time for which a reached goal has to last."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
 
 from ..compose import certify_levels
+from ..episode import OTHERWISE
 from ..pool.demonstrations import FAILED, POLICY, SCRIPTED, TELEOP, DemonstrationManifest
 from ..pool.manifest import PROCESS
 from ..pool.row import DemonstrationRow
@@ -51,7 +52,7 @@ class Recount:
     def keep(self, row: DemonstrationRow) -> Iterator[str]:
         """Count a demonstration; its faults."""
         yield from _misplaced(self.number(row), self.kept)
-        if row.outcome != "success" or row.reason:
+        if row.outcome != "success" or (row.reason and not row.reason.startswith(OTHERWISE)):
             yield "is a failed attempt among the demonstrations"
         self.styles[row.style] += 1
 

@@ -207,7 +207,8 @@ def _played(recorded: Recorded, scenario: Scenario, world: World, text: str) -> 
     labels = (*wrong_result(recorded.told, over == "success", seconds), *_wrong_absent(recorded, world))
     if episode.outcome != "success":
         return _fault(recorded, f"replayed, the goal is not reached: {episode.reason or 'no outcome'}")
-    return Replayed((*films.findings, *labels, *cameras), ("replay", *films.checks), unknown)
+    ways = (Finding("MEANS", "warning", (), {}, episode.reason),) if episode.lacks else ()
+    return Replayed((*films.findings, *labels, *cameras, *ways), ("replay", *films.checks), unknown)
 
 
 def _wrong_cameras(recorded: Recorded, scenario: Scenario, world: World) -> Iterator[Finding]:

@@ -226,13 +226,14 @@ class Run:
         else:
             played = session.replayed()
             row = row_of(task, draw, session.stage.scene_xml, place.take, TELEOP, played)
-            reason = "" if played.solved else f"{played.outcome}: {played.reason}"
+            ended = f"{played.outcome}: {played.reason}" if played.reason else played.outcome
+            reason = "" if played.solved else ended
             verdict, check = (KEPT, "") if played.solved else (FAILED, "solved")
             record = Record(place.number, verdict, check, reason, tries, rejected, row, 0.0)
             end = {
                 name: getattr(row, name) for name in ("outcome", "reason", "seconds", "witness_sha256", "final_state")
             }
-            told = f"{reason or played.outcome} after {played.seconds:.2f} s"
+            told = f"{ended} after {played.seconds:.2f} s"
         self._write_log(place, session, end)
         self._add(record)
         self.told(f"{place.stage.name}, take {place.take}: {told}; {self.made} of {self.settings.n}")

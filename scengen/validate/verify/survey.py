@@ -233,7 +233,7 @@ def unlike(reasons: Mapping[str, int], again: Counter[str], free: Collection[str
 
 def wrong_attack(manifest: Manifest) -> Iterator[str]:
     """Whether an attack on the finished pool has left out more scenarios than it has hits that show a way around."""
-    shown = {str(hit.get("scenario")) for hit in manifest.hits if hit.get("lacks")}
+    shown = {str(hit.get("scenario")) for hit in manifest.hits if hit.get("lacks") or hit.get("otherwise")}
     told = sum(times for key, times in manifest.reasons.items() if key.startswith("attack: "))
     if manifest.attack is not None and not manifest.config.certify.get("attack") and told > len(shown):
         yield f"the attack has refuted {told} scenarios, but shows a way around {len(shown)} of them"
