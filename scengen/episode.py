@@ -63,7 +63,8 @@ class Episode:
         self.lacks = ""
         """Means of the task that were lacking when the goal was reached, joined by semicolons; empty if none was, and
         as long as the goal has not been reached."""
-        self._means = Watch(scenario.means(), world)
+        self.means = Watch(scenario.means(), world)
+        """What has been shown of the means of the task."""
         self._eventful = type(scenario).events is not Scenario.events
 
     def step(self, action: NDArray[np.float32]) -> Outcome | None:
@@ -89,7 +90,7 @@ class Episode:
     def judge(self) -> Outcome | None:
         """Judge the past control period: failure takes precedence over success, success over the time limit."""
         if self.outcome is None:
-            self._means.update()
+            self.means.update()
         if self.outcome in (None, "success") and (lost := self.scenario.failure(self.world)):
             self.reason = f"after the goal was reached: {lost}" if self.outcome else lost
             self.outcome = "failure"
@@ -103,7 +104,7 @@ class Episode:
 
     def _reach(self) -> None:
         """Judge a goal that has been reached: unless the rules are the paper's, it must be reached by the means."""
-        self.lacks = self._means.lacking()
+        self.lacks = self.means.lacking()
         self.reason = f"{OTHERWISE}: {self.lacks}" if self.lacks else ""
         self.outcome = "failure" if self.lacks and self.rules == STRICT else "success"
 

@@ -87,6 +87,10 @@ class Watch:
             if shown[number] == OPEN and (not mean.after or shown[self._numbers[mean.after]] == SHOWN):
                 shown[number] = mean.found(self.world)
 
+    def found(self) -> dict[str, float]:
+        """What is found out about each mean so far: `OPEN`, `SHOWN` or `MISSED`."""
+        return {name: float(self.world.shown[number]) for name, number in self._numbers.items()}
+
     def lacking(self) -> str:
         """Names of the means that a success now lacks, joined by semicolons; empty for a success by the means."""
         return "; ".join(name for name, mean in self.means.items() if not self._has(name, mean))

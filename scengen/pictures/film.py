@@ -1,7 +1,7 @@
 """Films: recorded actions replayed in front of a camera, as a strip of pictures or as a video."""
 
 import io
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 from ..control.loop import Loop
 from ..episode import STRICT, Actions, Episode, Rules
 from ..errors import UnknownName
+from ..means import MISSED, OPEN, SHOWN
 from ..pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
@@ -71,9 +72,61 @@ class Take:
             done = period
             yield f"{period * Loop.PERIOD:.2f} s{note}"
 
+    def ways(self) -> list["Way"]:
+        """Replay the actions, and say of each mean of the task when it was decided."""
+        episode = Episode(self.scenario, World.load(self.scene_xml, self.embodiment), rules=self.rules)
+        at = dict[str, tuple[float, float]]()
+        for number, action in enumerate(self.actions, 1):
+            if episode.step(action) not in (None, "success"):
+                break
+            new = {
+                name: (found, number * Loop.PERIOD) for name, found in episode.means.found().items() if found != OPEN
+            }
+            at = new | at
+        lasting = {name for name, mean in episode.means.means.items() if mean.lasting and name not in at}
+        return [
+            Way(name, *at.get(name, (SHOWN if name in lasting else OPEN, self.seconds))) for name in episode.means.means
+        ]
+
     def even(self, count: int) -> list[int]:
         """`count` control periods at equal distances, from the start to the end."""
         return [int(period) for period in np.linspace(0, len(self.actions), count).round()]
+
+
+@dataclass(frozen=True)
+class Way:
+    """A mean of a task over the time of a take."""
+
+    name: str
+    found: float
+    """Whether it was `SHOWN` or `MISSED`, or is still `OPEN` at the end."""
+    seconds: float
+    """Time at which that was decided [s]; the end if it was true throughout, or is open."""
+
+    def __str__(self) -> str:
+        mark, word = {SHOWN: ("+", "by"), MISSED: ("-", "missed at"), OPEN: ("-", "not shown by")}[self.found]
+        return f"{mark} {self.name} ({word} {self.seconds:.2f} s)"
+
+
+def timeline(ways: Sequence[Way], seconds: float, width: int) -> Picture:
+    """A line for each mean: its name and, on an axis of time, where it was shown (green) or missed (red).
+
+    Args:
+        seconds: length of the axis [s].
+        width: width of the picture [pixels].
+    """
+    line = 22
+    image = Image.new("RGB", (width, line * len(ways) + line // 2), "white")
+    pen, font, left, right = ImageDraw.Draw(image), ImageFont.load_default(13), round(0.55 * width), width - line
+    for number, way in enumerate(ways):
+        y = line * number + line // 2
+        pen.text((line // 2, y - 4), way.name, "black", font)
+        at = left + (right - left) * min(1.0, way.seconds / max(seconds, Loop.PERIOD))
+        colour = {SHOWN: (30, 140, 60), MISSED: (200, 40, 40), OPEN: (150, 150, 150)}[way.found]
+        pen.line((left, y + 4, right, y + 4), (210, 210, 210), 2)
+        pen.line((left, y + 4, at, y + 4), colour, 2)
+        pen.rectangle((at - 4, y, at + 4, y + 8), colour)
+    return np.array(image)
 
 
 def shortcut(row: PoolRow, scenario: Scenario, name: str, raw: bool = False) -> tuple[Take, Rollout]:
@@ -98,7 +151,8 @@ def strip(
     camera: str | None = None,
     progress: Progress = lambda done, total: None,
 ) -> Picture:
-    """Pictures at equal times from the start to the end, in rows of four, each with its time and the outcome so far.
+    """Pictures at equal times from the start to the end, in rows of four, each with its time and the outcome so far;
+    below, the means of the task over time.
 
     Args:
         camera: one of the scene's or the robot's cameras. Default: the fitted view that hides least of the scene in
@@ -114,6 +168,7 @@ def strip(
         moments = [(eye.world.state(), caption) for caption in take.moments(eye.world, take.even(frames))]
         if camera is None:
             eye.look([state for state, _ in moments])
+        ways = take.ways()
         for state, caption in moments:
             eye.world.restore(state)
             pictures.append(captioned(eye.take(camera), caption))
@@ -121,7 +176,8 @@ def strip(
     columns = min(COLUMNS, frames)
     blank = np.full_like(pictures[0], 255)
     pictures += [blank] * (-frames % columns)
-    return np.vstack([np.hstack(pictures[i : i + columns]) for i in range(0, len(pictures), columns)])
+    rows = [np.hstack(pictures[i : i + columns]) for i in range(0, len(pictures), columns)]
+    return np.vstack([*rows, timeline(ways, take.seconds, columns * width)] if ways else rows)
 
 
 def captioned(picture: Picture, text: str) -> Picture:

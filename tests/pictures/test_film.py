@@ -1,6 +1,7 @@
 """Films show the actions that they are given, and the default view shows what matters in every task."""
 
 import itertools
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -12,6 +13,7 @@ from scengen import cli, list_tasks, load_task
 from scengen.assets.box import Cube, Domino
 from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.envs.observations import CAMERAS
+from scengen.means import MISSED, SHOWN
 from scengen.pictures import film, render
 from scengen.pictures.view import view
 from scengen.pool import Pool
@@ -71,7 +73,8 @@ def test_a_strip_begins_at_the_start_and_ends_when_the_witness_does(row, scenari
     """Seen through the scene's own camera, above the captions."""
     take, above = film.Take.witness(row, scenario), slice(0, 45)
     picture = film.strip(take, frames=3, width=96, height=72, camera="agentview")
-    assert picture.shape == (72, 288, 3)
+    picture, below = picture[:72], picture[72:]
+    assert picture.shape == (72, 288, 3) and (below == film.timeline(take.ways(), take.seconds, 288)).all()
     with render.camera(row.scene_xml, row.embodiment, 96, 72) as eye:
         assert (picture[above, :96] == eye.take("agentview")[above]).all()
         for action in row.witness:
@@ -85,6 +88,23 @@ def test_captions_tell_time_and_the_moment_of_success(row, scenario):
     told = list(take.moments(take.world(), take.even(3)))
     (witness,) = [check for check in row.certificate.checks if check.name == "witness"]
     assert told[0] == "0.00 s" and told[-1] == f"{take.seconds:.2f} s, success at {witness.numbers['seconds']:.2f} s"
+
+
+def test_ways_say_when_each_mean_was_decided(row, scenario):
+    take = film.Take.witness(row, scenario)
+    (witness,) = [check for check in row.certificate.checks if check.name == "witness"]
+    ways = {way.name: way for way in take.ways()}
+    assert {way.found for way in ways.values()} == {SHOWN} and ways.keys() == scenario.means().keys()
+    assert 0.0 < ways["each tile struck the next"].seconds <= witness.numbers["seconds"] < take.seconds
+    assert ways["the robot touched the first tile alone"].seconds == take.seconds
+    idle = replace(take, actions=np.zeros((30, 7), np.float32))
+    assert str(idle.ways()[2]) == "- each tile struck the next (not shown by 0.30 s)"
+
+
+def test_a_timeline_marks_where_a_mean_was_shown_and_missed():
+    picture = film.timeline([film.Way("a", SHOWN, 1.0), film.Way("b", MISSED, 2.0)], 2.0, 400)
+    green, red = (np.argwhere((picture == colour).all(axis=2)) for colour in ((30, 140, 60), (200, 40, 40)))
+    assert green[:, 1].max() < 320 < 370 < red[:, 1].max() and green[:, 0].max() < red[:, 0].min()
 
 
 @drawing
