@@ -28,6 +28,7 @@ from ..episode import STRICT, Actions, Episode, Outcome, Rules, check_rules
 from ..errors import BadConfig, ScengenError, UnknownName, Unstable, cut
 from ..orientation import Orientation
 from ..params import Value
+from ..perturb.perturbation import Perturbation
 from ..pictures.opengl import check_size
 from ..pictures.render import Camera
 from ..pool import PoolRow
@@ -142,6 +143,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         split: str | None = None,
         action_repeat: int = 1,
         rules: Rules = STRICT,
+        perturb: str | None = None,
+        perturb_seed: int = 0,
     ):
         """Open the pools.
 
@@ -166,6 +169,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
                 time limit in seconds does not change. A step ends early if the episode ends.
             rules: "strict", those of the certificates: a goal counts if it was reached by the means of the task; or
                 "paper": it counts however it was reached (docs/means.md).
+            perturb: kinds of perturbation at their levels, such as `light_direction@3+noise@1` (docs/perturb.md). The
+                physics stays as it is. The label `perturb` of `info` holds what was drawn.
+            perturb_seed: another number draws other perturbations for the same scenarios.
 
         Raises:
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown; pictures that are
@@ -180,6 +186,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode, self.camera = render_mode, camera
         self.action_filter, self.settle, self.action_repeat = action_filter, settle, action_repeat
         self.rules: Rules = rules
+        self.perturbation, self._perturb_seed = Perturbation.parse(perturb), perturb_seed
         self.task: Task = compose.load_task(task, search)
         rows = rows_of(pool, task)
         self._arguments["pool"] = located(pool)
@@ -188,6 +195,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         names = proprioception(self.task.embodiment) if names is None else names
         streams, cameras = _requested(names, self.task, rows, lambda: self.scenario.orientation)
         self.observed = ObservationSettings(streams, cameras, width, height)
+        shown = [] if render_mode is None else [cameras_of(self.task.embodiment).get(camera, camera)]
+        self.perturbation.check([*streams], [*cameras.values(), *shown])
         if self._needs_pictures:
             self.observed.check_picture_size(self.task, self._rows)
         self.metadata = {
@@ -357,6 +366,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self.close()
             self._world = stored_world(row, self._needs_pictures)
             self._scenario = self.task.scenario(row.params)
+            self.drawn = self.perturbation.of(row.id, self._perturb_seed)
+            if self._needs_pictures:
+                self.drawn.on_model(self._world.model)
         self._row = row
         self._played: list[NDArray[np.float32]] = []
         self._world.reset()
@@ -408,13 +420,23 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return bool(self.cameras) or self.render_mode is not None
 
     def _observe(self) -> Observation:
-        read = {name: clipped(s.read(self.world), s.bound) for name, s in self.streams.items()}
+        read = {name: clipped(self._perceived(name, s.read(self.world)), s.bound) for name, s in self.streams.items()}
         return {**read, **{name: self._picture(camera) for name, camera in self.observed.cameras.items()}}
+
+    def _perceived(self, name: str, reading: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A reading of a stream under the perturbation."""
+        return self.drawn.on_reading(name, self.streams[name].entries(name), reading, self._period)
+
+    @property
+    def _period(self) -> int:
+        """Number of the control period."""
+        return round(self.world.time / Loop.PERIOD)
 
     def _picture(self, camera: str) -> NDArray[np.uint8]:
         if self._renderer is None:
             self._renderer = Camera(self.world, self.observed.width, self.observed.height)
-        return self._scenario.orientation.apply(self._renderer.take(camera)).copy()
+        picture = self._scenario.orientation.apply(self._renderer.take(camera)).copy()
+        return self.drawn.on_picture(picture, camera, self._period)
 
     def _info(self, reason: str, success: bool) -> dict[str, Any]:
         found = {"success": success, "is_success": success, "reason": reason, "lacks": self._episode.lacks}
@@ -423,7 +445,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _labels(self) -> dict[str, Any]:
         """Labels of the running scenario. A policy that sees them can memorise scenarios."""
         row = self._row
-        return {"scenario": row.id, "split": row.split, "axes": list(row.axes), "scene_sha256": row.scene_sha256}
+        labels = {"scenario": row.id, "split": row.split, "axes": list(row.axes), "scene_sha256": row.scene_sha256}
+        return {**labels, "perturb": self.drawn.plain()} if self.perturbation else labels
 
 
 _unseeded: "weakref.WeakSet[PoolEnv]" = weakref.WeakSet()

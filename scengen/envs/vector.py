@@ -296,7 +296,10 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         found = dict[str, Reading]()
         for name, stream in self.envs[0].streams.items():
             values = np.array(self._views[name]) if stream.view else self._readings[name]
-            found[name] = clipped(stream.convert(values) if stream.convert else values, stream.bound)
+            values = stream.convert(values) if stream.convert else values
+            if self.envs[0].perturbation:
+                values = np.array([e._perceived(name, one) for e, one in zip(self.envs, values, strict=True)])
+            found[name] = clipped(values, stream.bound)
         return {**found, **{name: value.copy() for name, value in self._pictures.items()}}
 
     def _gathered(

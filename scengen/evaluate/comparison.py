@@ -118,6 +118,8 @@ class PolicyResult:
             "task_versions": self.task_versions,
             "edition": settings.edition and edition_told(settings.edition),
             "settle": settings.settle,
+            "perturb": settings.perturb,
+            "perturb_seed": settings.perturb_seed,
             "headline": self.headline,
             "table": plain(self.lines),
             "failures": [asdict(failure) for failure in self.failures],
@@ -193,6 +195,8 @@ class Comparison:
             f"{names}: success in percent [95 % interval], {settings.seeds} scenarios a pool, "
             f"{settings.rollouts} rollouts each, {settings.rules} rules{settling}"
         )
+        if settings.perturb:
+            head += f", perturbed by {settings.perturb} (seed {settings.perturb_seed})"
         if settings.edition:
             edition = edition_told(settings.edition)
             head += f", edition {edition['name']} (sha256 {edition['sha256'][:12]})"

@@ -168,6 +168,8 @@ class PolicyPlayer:
                 action_repeat=remote.repeat if remote else settings.action_repeat,
                 rules=check_rules(settings.rules),
                 settle=settings.settle,
+                perturb=settings.perturb,
+                perturb_seed=settings.perturb_seed,
                 search=self.search,
             )
             memory = _training(folders) if settings.name == REPLAY else None
@@ -212,7 +214,8 @@ class _Rollout:
         key = {"pool": self.which.pool, "scenario": self.which.scenario, "rollout": self.which.rollout}
         world = self.env.world
         told = {"success": success, "reason": reason, "seconds": round(world.time, 3), "phase": phase(world)}
-        self.record = {**key, **told, **more}
+        drawn = self.env.drawn
+        self.record = {**key, **told, **more, **({"perturb": drawn.plain()} if drawn.values else {})}
 
 
 def _of_slot(seen: Mapping[str, Any], slot: int) -> Observation:

@@ -201,6 +201,8 @@ def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, An
         chosen["client"] = settings.remote.identity()
     if not settings.settle:
         chosen["settle"] = False
+    if settings.perturb:
+        chosen |= {"perturb": settings.perturb, "perturb_seed": settings.perturb_seed}
     if settings.keep:
         chosen["keep"] = settings.keep
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}

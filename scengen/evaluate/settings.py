@@ -12,6 +12,7 @@ from ..envs.vector import MAX_SLOTS
 from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName, cut
 from ..learn.store import is_policy, read_settings
+from ..perturb.perturbation import Perturbation
 from ..pool import collection
 from ..work.limits import at_least
 from ..work.parallel import Workers
@@ -55,6 +56,8 @@ class EvaluateSettings:
     splits: str = ALL
     settle: bool = True
     keep: list[str] = field(default_factory=list)
+    perturb: str | None = None
+    perturb_seed: int = 0
 
     @cached_property
     def folders(self) -> list[str]:
@@ -121,9 +124,10 @@ class EvaluateSettings:
         """Raise `ScengenError` if a setting is not valid."""
         check_filter(self.action_filter)
         check_rules(self.rules)
+        Perturbation.parse(self.perturb)
         if self.splits not in SPLITS:
             raise UnknownName("splits", self.splits, SPLITS)
-        at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1)
+        at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1, perturb_seed=0)
         if not 1 <= self.slots <= MAX_SLOTS:
             raise BadConfig(f"slots = {self.slots}; it must lie in [1, {MAX_SLOTS}]")
         if self.action_repeat != 1 and self.name in FULL_RATE_POLICIES:

@@ -32,6 +32,7 @@ Kind = Literal[
     "plan",
     "prior",
     "drift",
+    "perturb",
 ]
 """Kind of a measurement, and name of its folder in records/.
 
@@ -39,7 +40,7 @@ Kind = Literal[
 `belief`: planners with beliefs of training; `baseline`, `training`: trained policies; `attack`: the adversary; `cheat`:
 cheats of people; `leak`: hidden parameters in observations; `recall`: cheats that the adversary finds again;
 `mutation`: rules left out; `plan`: plans carried out; `prior`: answers that need no look; `drift`: verdicts under other
-versions of MuJoCo.
+versions of MuJoCo; `perturb`: proofs of perturbations.
 """
 KINDS: tuple[Kind, ...] = get_args(Kind)
 """All kinds."""

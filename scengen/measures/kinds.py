@@ -5,12 +5,13 @@ from collections.abc import Mapping
 from .adversary import Attacks, LeakSearches
 from .axes import Beliefs, Cards
 from .measurement import Measurement
+from .perturbations import Proofs
 from .policies import Baselines, Trainings
 from .scenarios import Certified, Drift
 from .understanding import Plans, Priors
 
 MEASUREMENTS: Mapping[str, type[Measurement]] = {
     one.KIND: one
-    for one in (Certified, Cards, Beliefs, Attacks, LeakSearches, Drift, Plans, Priors, Baselines, Trainings)
+    for one in (Certified, Cards, Beliefs, Attacks, LeakSearches, Drift, Plans, Priors, Baselines, Trainings, Proofs)
 }
 """Measurements by the kind of their rows. Rows of other kinds come from tools of the repository."""

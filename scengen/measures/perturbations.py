@@ -1,0 +1,60 @@
+"""Measurement of perturbations: the proofs of every kind and level on scenarios of each task."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count, islice
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..perturb.perturbation import LEVELS, kinds
+from ..perturb.proofs import Proof, staged
+from ..samplers.split import ID
+from ..samplers.task import Task
+from ..validate.rebuilt import rebuild, world_of
+from ..validate.rollout import run
+from .measurement import Job, Measurement, Result, Row
+from .scenarios import feasible
+
+
+@dataclass(frozen=True)
+class Proofs(Measurement):
+    """Proofs of all kinds of perturbation at all levels on the first n training scenarios that the oracle solves.
+
+    A cell, a kind at a level, passes if in each scenario the physics is the same to the bit, each camera and stream
+    that it affects differs, and each body that clean pictures show stays in sight.
+    """
+
+    KIND = "perturb"
+    OPTIONS: ClassVar[Mapping[str, Any]] = {"n": 1}
+
+    def all_splits(self, task: Task) -> Sequence[str]:
+        return (ID,)
+
+    def jobs(self, task: Task) -> Iterator[Job]:
+        if self.chosen(task):
+            strengths = {name: list(kind.strengths) for name, kind in kinds().items()}
+            yield Job(task, (ID,), {**self.options, "strengths": strengths})
+
+    def result(self, job: Job) -> Result:
+        task = job.task
+        cells: dict[tuple[str, int], list[Proof]] = {}
+        for scenario in islice(feasible(task, ID, count()), self.options["n"]):
+            played = run(scenario, world_of(scenario, task.embodiment), scenario.oracle, task.horizon)
+            with staged(scenario, rebuild(scenario), task.embodiment, played.actions) as stage:
+                for kind in kinds().values():
+                    for level in range(1, LEVELS + 1):
+                        cells.setdefault((kind.name, level), []).append(stage.proof(kind, level))
+        faults = {
+            f"{name}@{level}": sorted({fault for proof in proofs for fault in proof.faults()})
+            for (name, level), proofs in cells.items()
+        }
+        changes = {f"{name}@{level}": _mean(proofs) for (name, level), proofs in cells.items()}
+        value = {"faults": {cell: told for cell, told in faults.items() if told}, "changes": changes}
+        words = f"{len(cells) - len(value['faults'])} of {len(cells)} cells are proved"
+        return Result(job, [Row(ID, self.options["n"], value)], words, not value["faults"])
+
+
+def _mean(proofs: Sequence[Proof]) -> float:
+    """Mean change over scenarios, cameras and streams."""
+    return round(float(np.mean([change for proof in proofs for change in proof.changes.values()] or [0.0])), 5)

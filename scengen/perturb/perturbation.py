@@ -1,0 +1,224 @@
+"""Perturbations by name and level, and what they draw for a scenario.
+
+`light_direction@3+noise@1` is two kinds at their levels. What is drawn depends on kind, scenario and seed, and its
+strength on the level: the same scenario looks the same in each episode, in each process, and beside any other
+perturbation, and a higher level goes farther in the same direction.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import mujoco
+import numpy as np
+
+from ..errors import BadConfig, UnknownName
+from ..samplers.keyed import unit
+from ..samplers.task_files import conf_dir
+from ..work.plain import read_yaml
+from .effects import (
+    EFFECTS,
+    EYE,
+    FIXED,
+    OBJECTS,
+    PICTURES,
+    PROPRIOCEPTION,
+    WRENCH,
+    WRIST,
+    Effect,
+    Picture,
+    Reading,
+    Values,
+)
+
+LEVELS = 5
+"""Number of levels of each kind."""
+NONE = "none"
+"""Name of no perturbation."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of perturbation."""
+
+    name: str
+    strengths: tuple[float, ...]
+    """Strength at each level."""
+    unit: str
+    """Unit of the strengths."""
+    why: str
+    """Reason for the range."""
+    source: str
+    """Ranges that others use."""
+
+    @property
+    def effect(self) -> Effect:
+        return EFFECTS[self.name]
+
+
+@cache
+def kinds() -> Mapping[str, Kind]:
+    """All kinds, from `conf/perturb`.
+
+    Raises:
+        BadConfig: a file is damaged, has not as many growing strengths as there are levels, or no effect.
+    """
+    found = {}
+    for path in sorted((conf_dir() / "perturb").glob("*.yaml")):
+        node, name = read_yaml("kind", path), path.stem
+        if name not in EFFECTS:
+            raise BadConfig(f"{path}: there is no effect named {name}; give it in scengen.perturb.effects")
+        try:
+            strengths = tuple(float(each) for each in node["strengths"])
+            kind = Kind(name, strengths, *(str(node[key]) for key in ("unit", "why", "source")))
+        except (KeyError, TypeError, ValueError) as error:
+            raise BadConfig(f"{path}: give strengths, unit, why and source ({error})") from None
+        if len(strengths) != LEVELS or any(b <= a for a, b in zip((0.0, *strengths), strengths, strict=False)):
+            raise BadConfig(f"{path}: strengths = {list(strengths)}; give {LEVELS} growing positive numbers")
+        found[name] = kind
+    return found
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """Some kinds at their levels."""
+
+    parts: tuple[tuple[str, int], ...]
+    """Kind and level of each."""
+
+    @classmethod
+    def parse(cls, text: str | None) -> "Perturbation":
+        """Read `kind@level`, several separated by `+`; nothing for None, an empty text or `none`.
+
+        Raises:
+            UnknownName: there is no such kind.
+            BadConfig: a level does not exist, or two parts are one kind.
+        """
+        parts = list[tuple[str, int]]()
+        for one in (text or "").split("+") if text not in (None, "", NONE) else ():
+            name, at, level = one.strip().partition("@")
+            if name not in kinds():
+                raise UnknownName("perturbation", name, kinds())
+            if not at or not level.isdigit() or not 1 <= int(level) <= LEVELS:
+                raise BadConfig(f"perturb = {text}; give {name} a level from 1 to {LEVELS}, such as {name}@3")
+            if name in dict(parts):
+                raise BadConfig(f"perturb = {text}; {name} is in it twice: give each kind once")
+            parts.append((name, int(level)))
+        return cls(tuple(parts))
+
+    def __str__(self) -> str:
+        return "+".join(f"{name}@{level}" for name, level in self.parts) or NONE
+
+    def __bool__(self) -> bool:
+        return bool(self.parts)
+
+    def check(self, streams: Sequence[str], cameras: Sequence[str]) -> None:
+        """Raise `BadConfig` if a part affects nothing that is observed.
+
+        Args:
+            streams: names of the observed streams.
+            cameras: robosuite's names of the observed cameras.
+        """
+        for name, level in self.parts:
+            effect = kinds()[name].effect
+            if effect.reads == PICTURES:
+                seen = [camera for camera in cameras if affects(effect, camera)]
+                what = (
+                    f"{effect.cameras}, and none is observed: observe one, such as rgb_exo_right_cam or rgb_gripper_cam"
+                )
+            else:
+                seen = [stream for stream in streams if stream_kind(stream) == effect.reads]
+                what = f"streams of {effect.reads}, and none is observed: observe one"
+            if not seen:
+                raise BadConfig(f"perturb = {name}@{level} affects {what}")
+
+    def of(self, scenario: str, seed: int = 0) -> "Drawn":
+        """What is drawn for a scenario.
+
+        Args:
+            scenario: its id.
+        """
+        values = {}
+        for name, level in self.parts:
+            rng = _random("draw", name, scenario, seed)
+            values[name] = kinds()[name].effect.draw(kinds()[name].strengths[level - 1], rng)
+        return Drawn(self, scenario, seed, values)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A perturbation of one scenario."""
+
+    perturbation: Perturbation
+    scenario: str
+    seed: int
+    values: Mapping[str, Values]
+    """Drawn values by kind."""
+
+    @cached_property
+    def effects(self) -> Mapping[str, Effect]:
+        return {name: kinds()[name].effect for name in self.values}
+
+    def plain(self) -> dict[str, dict[str, float | list[float]]]:
+        """The values as plain data."""
+        return {
+            name: {key: list(value) if isinstance(value, Sequence) else value for key, value in values.items()}
+            for name, values in self.values.items()
+        }
+
+    def on_model(self, model: mujoco.MjModel) -> None:
+        """Change lights, colours and cameras of a compiled scene, once."""
+        for name, values in self.values.items():
+            self.effects[name].on_model(model, values)
+
+    def on_picture(self, picture: Picture, camera: str, period: int) -> Picture:
+        """A picture as it is perceived.
+
+        Args:
+            camera: name of the camera.
+            period: number of the control period.
+        """
+        for name, values in self.values.items():
+            effect = self.effects[name]
+            if effect.on_picture is not None and affects(effect, camera):
+                picture = effect.on_picture(picture, values, self._rng(name, camera, period))
+        return picture
+
+    def on_reading(self, stream: str, entries: Sequence[str], reading: Reading, period: int) -> Reading:
+        """A reading of a stream as it is perceived.
+
+        Args:
+            entries: full names of its entries.
+            period: number of the control period.
+        """
+        for name, values in self.values.items():
+            effect = self.effects[name]
+            if effect.on_reading is not None and stream_kind(stream) == effect.reads:
+                reading = effect.on_reading(entries, reading, values, self._rng(name, stream, period))
+        return reading
+
+    def _rng(self, name: str, what: str, period: int) -> np.random.Generator:
+        return _random("use", name, dict(self.perturbation.parts)[name], self.scenario, self.seed, what, period)
+
+
+def affects(effect: Effect, camera: str) -> bool:
+    """Whether an effect shows in a camera, given robosuite's name."""
+    on_wrist = camera.endswith(EYE)
+    return effect.reads == PICTURES and not (
+        (effect.cameras == FIXED and on_wrist) or (effect.cameras == WRIST and not on_wrist)
+    )
+
+
+def stream_kind(stream: str) -> str:
+    """Which kind of reading a stream is."""
+    if "force_torque" in stream:
+        return WRENCH
+    own = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")
+    if stream.startswith("robot") and stream.endswith(own):
+        return PROPRIOCEPTION
+    return "" if "tactile" in stream else OBJECTS
+
+
+def _random(*key: str | int) -> np.random.Generator:
+    """Random numbers that depend on a key alone."""
+    return np.random.default_rng(int(unit("perturb", *key) * 2**53))
