@@ -14,7 +14,7 @@ FORMS: Mapping[str, tuple[str, ...]] = {
     "verify": ("robosuite", "mujoco"),
     "demos": ("pad",),
     "curate": ("stats",),
-    "show": ("film", "view"),
+    "show": ("film", "view", "perturb"),
     "report": ("audit", "compare"),
     "export": ("recipe", "hub"),
     "evaluate": ("power",),

@@ -281,4 +281,4 @@ EFFECTS: Mapping[str, Effect] = {
     "wrench_noise": Effect(_value("sigma"), WRENCH, on_reading=_noise),
     "object_noise": Effect(_value("sigma"), OBJECTS, on_reading=_noise),
 }
-"""What each kind does, by its name. `conf/perturb` has a file for each, with its strengths."""
+"""What each kind does, by its name. `conf/perturbations` has a file for each, with its strengths."""

@@ -5,12 +5,14 @@ strength on the level: the same scenario looks the same in each episode, in each
 perturbation, and a higher level goes farther in the same direction.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import BadConfig, UnknownName
 from ..samplers.keyed import unit
@@ -33,6 +35,8 @@ from .effects import (
 
 LEVELS = 5
 """Number of levels of each kind."""
+HEADLIGHT = ("ambient", "diffuse", "specular")
+"""Colours of the light at the camera."""
 NONE = "none"
 """Name of no perturbation."""
 
@@ -58,13 +62,13 @@ class Kind:
 
 @cache
 def kinds() -> Mapping[str, Kind]:
-    """All kinds, from `conf/perturb`.
+    """All kinds, from `conf/perturbations`.
 
     Raises:
         BadConfig: a file is damaged, has not as many growing strengths as there are levels, or no effect.
     """
     found = {}
-    for path in sorted((conf_dir() / "perturb").glob("*.yaml")):
+    for path in sorted((conf_dir() / "perturbations").glob("*.yaml")):
         node, name = read_yaml("kind", path), path.stem
         if name not in EFFECTS:
             raise BadConfig(f"{path}: there is no effect named {name}; give it in scengen.perturb.effects")
@@ -171,6 +175,21 @@ class Drawn:
         for name, values in self.values.items():
             self.effects[name].on_model(model, values)
 
+    @contextmanager
+    def while_applied(self, model: mujoco.MjModel) -> Iterator[set[str]]:
+        """Change a compiled scene as `on_model` during a `with` statement; the names of the arrays that differ then."""
+        before = arrays(model)
+        light = {part: getattr(model.vis.headlight, part).copy() for part in HEADLIGHT}
+        self.on_model(model)
+        changed = {name for name, array in arrays(model).items() if array.tobytes() != before[name].tobytes()}
+        try:
+            yield changed
+        finally:
+            for name in changed:
+                getattr(model, name)[...] = before[name]
+            for part, value in light.items():
+                setattr(model.vis.headlight, part, value)
+
     def on_picture(self, picture: Picture, camera: str, period: int) -> Picture:
         """A picture as it is perceived.
 
@@ -199,6 +218,12 @@ class Drawn:
 
     def _rng(self, name: str, what: str, period: int) -> np.random.Generator:
         return _random("use", name, dict(self.perturbation.parts)[name], self.scenario, self.seed, what, period)
+
+
+def arrays(model: mujoco.MjModel) -> dict[str, NDArray[np.generic]]:
+    """Copies of all arrays of a compiled scene, by name."""
+    every = ((name, getattr(model, name)) for name in dir(model) if not name.startswith("_"))
+    return {name: array.copy() for name, array in every if isinstance(array, np.ndarray)}
 
 
 def affects(effect: Effect, camera: str) -> bool:

@@ -79,7 +79,8 @@ class Stage:
     def proof(self, kind: Kind, level: int) -> Proof:
         """Try a kind at a level."""
         drawn = Perturbation(((kind.name, level),)).of(self.scenario.id)
-        with self._changed(drawn) as neutral:
+        with drawn.while_applied(self.world.model) as changed:
+            neutral = all(name.startswith(SEEN) for name in changed)
             if kind.effect.reads != PICTURES:
                 return Proof(neutral, self._reading_changes(kind, drawn), ())
             changes = dict.fromkeys((n for n, camera in self.cameras.items() if affects(kind.effect, camera)), 0.0)
@@ -103,22 +104,6 @@ class Stage:
             episode.step(action)
             states += [self.world.state()] * int((at == number).sum())
         return states, self.world.digest
-
-    @contextmanager
-    def _changed(self, drawn: Drawn) -> Iterator[bool]:
-        """Change the compiled scene during a `with` statement; whether only what pictures alone use has changed."""
-        model = self.world.model
-        before = _arrays(model)
-        light = {part: getattr(model.vis.headlight, part).copy() for part in ("ambient", "diffuse", "specular")}
-        drawn.on_model(model)
-        changed = {name for name, array in _arrays(model).items() if array.tobytes() != before[name].tobytes()}
-        try:
-            yield all(name.startswith(SEEN) for name in changed)
-        finally:
-            for name in changed:
-                getattr(model, name)[...] = before[name]
-            for part, value in light.items():
-                setattr(model.vis.headlight, part, value)
 
     def _pictures(self, drawn: Drawn | None, number: int) -> dict[str, Picture]:
         """Pictures of all cameras at a moment."""
@@ -169,15 +154,6 @@ class Stage:
     def _all_streams(self) -> Mapping[str, Stream]:
         state = ObjectState(dict.fromkeys(self.world.free_bodies, True), len(self.world.arms))
         return {**self.streams, **privileged(state, type(self.scenario), Orientation)}
-
-
-def _arrays(model: mujoco.MjModel) -> dict[str, NDArray[np.generic]]:
-    """Copies of all arrays of a compiled scene."""
-    found = {}
-    for name in dir(model):
-        if not name.startswith("_") and isinstance(value := getattr(model, name), np.ndarray):
-            found[name] = value.copy()
-    return found
 
 
 def _of_robot(model: mujoco.MjModel, body: int) -> bool:

@@ -24,6 +24,7 @@ MAX_SETTINGS = {
     "minutes": 100_000,
     "n": 1_000_000,
     "permutations": 1_000_000,
+    "perturb_seed": 2**63 - 1,
     "played": 1000,
     "repeats": 1000,
     "rollouts": 1_000_000,
@@ -32,6 +33,7 @@ MAX_SETTINGS = {
     "sample": 1_000_000_000,
     "seed": 2**63 - 1,  # a column of a pool holds it
     "seeds": 1_000_000,
+    "size": 1024,  # a sheet has dozens of such pictures [pixels]
     "steps": 100,
     "width": 4096,
     "workers": 256,

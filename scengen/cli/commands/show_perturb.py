@@ -1,0 +1,68 @@
+"""write a sheet of a scenario as it is and under every level of perturbations"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...envs.observations import cameras_of
+from ...errors import BadConfig, UnknownName
+from ...ood.analysis.redraw import task_of
+from ...perturb.perturbation import Perturbation, kinds
+from ...pictures.perturbed import sheet
+from ...pictures.render import check_pictures, encode
+from ...runs.progress import ProgressBar
+from ...samplers.task_files import search_path
+from ...validate.playable import check_row
+from ...work.limits import at_least
+from ...work.targets import try_file
+from . import OK, Arguments, chosen, err, holder, say, write
+from .settings import read
+
+EVERY = "all"
+"""Name of all kinds."""
+
+
+@dataclass(frozen=True)
+class SheetSettings:
+    """Settings of `scengen show perturb`; conf/command/show_perturb.yaml explains them."""
+
+    pool: str | list[str]
+    id: str
+    perturb: str
+    to: str
+    camera: str
+    size: int
+    seed: int
+
+
+def command(arguments: Arguments) -> int:
+    settings = read("show perturb", arguments, SheetSettings)
+    at_least(settings, size=16, seed=0)
+    if Path(settings.to).suffix not in (".png", ".webp"):
+        raise BadConfig(f"to = {settings.to}; give a .png or .webp file")
+    try_file(settings.to)
+    names = [one.partition("@")[0] for one in settings.perturb.split("+")]
+    wanted = list(kinds().values()) if settings.perturb == EVERY else [kinds()[name] for name in _known(names)]
+    check_pictures()
+    pool = holder(settings.pool, settings.id)
+    row = check_row(chosen(pool, settings.id))
+    cameras = cameras_of(row.embodiment)
+    if settings.camera not in cameras:
+        raise UnknownName("camera", settings.camera, cameras)
+    camera = cameras[settings.camera]
+    for kind in wanted if settings.perturb != EVERY else ():
+        Perturbation(((kind.name, 1),)).check((), [camera])
+    scenario = task_of(pool, search_path(arguments)).scenario(row.params)
+    with ProgressBar(err, "sheet", 1) as bar:
+        picture = sheet(row, scenario, wanted, camera, settings.size, settings.seed, bar.of)
+    write(Path(settings.to), encode(picture, Path(settings.to).suffix[1:]))
+    for kind in wanted:
+        say(f"{kind.name}: {', '.join(f'{each:g}' for each in kind.strengths)} {kind.unit}. {kind.why}")
+    say(f"wrote {settings.to}")
+    return OK
+
+
+def _known(names: list[str]) -> list[str]:
+    for name in names:
+        if name not in kinds():
+            raise UnknownName("perturbation", name, [*kinds(), EVERY])
+    return names

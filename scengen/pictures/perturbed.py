@@ -1,0 +1,53 @@
+"""A sheet of perturbations: the start of a scenario, clean and at every level of some kinds."""
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+
+import numpy as np
+
+from ..perturb.effects import PICTURES
+from ..perturb.perturbation import LEVELS, Kind, Perturbation, affects
+from ..pool import PoolRow
+from ..scenario import Scenario
+from ..validate.playable import stored_world
+from .film import captioned
+from .render import Camera, Picture
+
+Progress = Callable[[int, int], None]
+"""Function that gets the number of finished pictures and the number of all."""
+
+
+def sheet(
+    row: PoolRow,
+    scenario: Scenario,
+    kinds: Sequence[Kind],
+    camera: str,
+    size: int,
+    seed: int,
+    progress: Progress = lambda done, total: None,
+) -> Picture:
+    """A row of pictures for each kind that changes pictures of the camera: clean, and at each level.
+
+    Args:
+        camera: robosuite's name of the camera.
+        size: width and height of each picture [pixels].
+        seed: seed of the perturbations.
+    """
+    shown = [kind for kind in kinds if kind.effect.reads == PICTURES and affects(kind.effect, camera)]
+    levels = [Perturbation(((kind.name, level),)) for kind in shown for level in range(1, LEVELS + 1)]
+    pictures, world = list[Picture](), stored_world(row, visual=True)
+    with closing(Camera(world, size, size)) as eye:
+
+        def taken() -> Picture:
+            return scenario.orientation.apply(eye.take(camera)).copy()
+
+        clean = taken()
+        for perturbation in levels:
+            drawn = perturbation.of(row.id, seed)
+            with drawn.while_applied(world.model):
+                picture = drawn.on_picture(taken(), camera, 0)
+            pictures.append(captioned(picture, str(perturbation)))
+            progress(len(pictures), len(levels))
+    first = captioned(clean, "clean")
+    rows = [[first, *pictures[k : k + LEVELS]] for k in range(0, len(pictures), LEVELS)]
+    return np.vstack([np.hstack(each) for each in rows])
