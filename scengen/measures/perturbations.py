@@ -22,7 +22,7 @@ class Proofs(Measurement):
     """Proofs of all kinds of perturbation at all levels on the first n training scenarios that the oracle solves.
 
     A cell, a kind at a level, passes if in each scenario the physics is the same to the bit, each camera and stream
-    that it affects differs, and each body that clean pictures show stays in sight.
+    that it affects differs, each body that clean pictures show stays in sight, and the level before changes less.
     """
 
     KIND = "perturb"
@@ -50,6 +50,9 @@ class Proofs(Measurement):
             for (name, level), proofs in cells.items()
         }
         changes = {f"{name}@{level}": _mean(proofs) for (name, level), proofs in cells.items()}
+        for name, level in cells:
+            if level > 1 and changes[f"{name}@{level}"] <= changes[f"{name}@{level - 1}"]:
+                faults[f"{name}@{level}"].append(f"it changes no more than level {level - 1}")
         value = {"faults": {cell: told for cell, told in faults.items() if told}, "changes": changes}
         words = f"{len(cells) - len(value['faults'])} of {len(cells)} cells are proved"
         return Result(job, [Row(ID, self.options["n"], value)], words, not value["faults"])

@@ -1,6 +1,6 @@
 """Proofs that a perturbation leaves the physics alone, changes what is perceived, and hides nothing that matters."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 
@@ -31,8 +31,13 @@ MIN_PIXELS = 8
 """Least number of pixels of a body in one camera, if that many show it in the clean picture of some camera."""
 MIN_SHARE = 0.25
 """Least share of the clean pixels of a body that the camera with most of them keeps."""
+DARK = 64
+"""Grey level below which a pixel of a white picture is covered."""
 SEEN = ("light_", "cam_", "geom_rgba", "mat_", "site_rgba", "tex_", "vis")
 """Beginnings of the names of what pictures alone use in a compiled scene."""
+
+Ids = Mapping[str, NDArray[np.int32]]
+"""Number of the body in each pixel, by camera."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,8 @@ class Stage:
         self.eye = Camera(self.world, SIZE, SIZE)
         self.states, self.digest = self._played()
         self.clean = [self._pictures(None, number) for number in range(MOMENTS)]
-        self.shown = [self._counts(None, number) for number in range(MOMENTS)]
+        self.ids = [self._ids(number) for number in range(MOMENTS)]
+        self.shown = [self._counts(ids) for ids in self.ids]
 
     def close(self) -> None:
         self.eye.close()
@@ -83,14 +89,15 @@ class Stage:
             neutral = all(name.startswith(SEEN) for name in changed)
             if kind.effect.reads != PICTURES:
                 return Proof(neutral, self._reading_changes(kind, drawn), ())
-            changes = dict.fromkeys((n for n, camera in self.cameras.items() if affects(kind.effect, camera)), 0.0)
-            hidden = set[str]()
+            seen = [name for name, camera in self.cameras.items() if affects(kind.effect, camera)]
+            moved = any(name.startswith("cam_") for name in changed)
+            changes, hidden = dict.fromkeys(seen, 0.0), set[str]()
             for number in range(MOMENTS):
-                pictures = self._pictures(drawn, number)
-                for name in changes:
-                    far = np.abs(pictures[name].astype(float) - self.clean[number][name]).mean()
+                for name, picture in self._pictures(drawn, number, seen).items():
+                    far = np.abs(picture.astype(float) - self.clean[number][name]).mean()
                     changes[name] = max(changes[name], float(far))
-                hidden |= self._lost(self.shown[number], self._counts(drawn, number))
+                ids = self._ids(number) if moved else self.ids[number]
+                hidden |= self._lost(self.shown[number], self._counts(self._uncovered(drawn, ids)))
             if level == LEVELS:
                 neutral = neutral and self._played()[1] == self.digest
         return Proof(neutral, changes, tuple(sorted(hidden)))
@@ -105,24 +112,31 @@ class Stage:
             states += [self.world.state()] * int((at == number).sum())
         return states, self.world.digest
 
-    def _pictures(self, drawn: Drawn | None, number: int) -> dict[str, Picture]:
-        """Pictures of all cameras at a moment."""
+    def _pictures(self, drawn: Drawn | None, number: int, names: Iterable[str] | None = None) -> dict[str, Picture]:
+        """Pictures of some cameras at a moment, by default of all."""
         self.world.restore(self.states[number])
         period = round(self.world.time / Loop.PERIOD)
-        found = {name: self.eye.take(camera).copy() for name, camera in self.cameras.items()}
+        chosen = self.cameras if names is None else names
+        found = {name: self.eye.take(self.cameras[name]).copy() for name in chosen}
         if drawn is None:
             return found
         return {name: drawn.on_picture(picture, self.cameras[name], period) for name, picture in found.items()}
 
-    def _counts(self, drawn: Drawn | None, number: int) -> dict[str, dict[str, int]]:
-        """Number of pixels of each body of the scene in each camera at a moment."""
+    def _ids(self, number: int) -> Ids:
+        """Number of the body in each pixel of each camera at a moment."""
         self.world.restore(self.states[number])
+        return {name: self.eye.bodies(camera) for name, camera in self.cameras.items()}
+
+    def _uncovered(self, drawn: Drawn, ids: Ids) -> Ids:
+        """The same without pixels that would be dark in a white picture."""
+        white = np.full((SIZE, SIZE, 3), 255, np.uint8)
+        covered = {n: (drawn.on_picture(white, camera, 0) < DARK).all(axis=2) for n, camera in self.cameras.items()}
+        return {name: np.where(covered[name], -1, seen) for name, seen in ids.items()}
+
+    def _counts(self, ids: Ids) -> dict[str, dict[str, int]]:
+        """Number of pixels of each body of the scene in each camera."""
         model, found = self.world.model, dict[str, dict[str, int]]()
-        for name, camera in self.cameras.items():
-            seen = self.eye.bodies(camera)
-            if drawn is not None:
-                white = np.full((*seen.shape, 3), 255, np.uint8)
-                seen = np.where((drawn.on_picture(white, camera, 0) < 64).all(axis=2), -1, seen)
+        for name, seen in ids.items():
             bodies, counts = np.unique(seen[seen > 0], return_counts=True)
             found[name] = {
                 model.body(body).name: int(count)
