@@ -1,0 +1,247 @@
+"""Perturbations are drawn by key, change what is perceived and nothing else, and faults in them are found."""
+
+import copy
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from helpers import REFERENCE, pictures_are_possible
+
+from scengen import cli
+from scengen.compose import load_task
+from scengen.envs.gym import PoolEnv
+from scengen.envs.vector import PoolVectorEnv
+from scengen.errors import BadConfig, UnknownName
+from scengen.perturb import effects, perturbation
+from scengen.perturb.effects import EFFECTS, EYE, PICTURES
+from scengen.perturb.perturbation import LEVELS, Perturbation, kinds
+from scengen.perturb.proofs import staged
+from scengen.pool import Pool
+
+drawing = pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL")
+STREAMS = ["robot0_eef_pos", "robot0_eef_quat", "force_torque", "object-state"]
+CAMERAS = ["rgb_exo_right_cam", "rgb_gripper_cam"]
+
+
+@pytest.fixture(scope="module")
+def row():
+    return Pool.open(REFERENCE).at(0)
+
+
+def test_every_effect_has_a_file_with_five_growing_strengths():
+    assert kinds().keys() == EFFECTS.keys()
+    for kind in kinds().values():
+        assert len(kind.strengths) == LEVELS and all(np.diff(kind.strengths) > 0) and kind.why and kind.source
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "says"),
+    [
+        ("nose@3", UnknownName, r"no perturbation named 'nose' \(did you mean 'noise'\?\)"),
+        ("noise", BadConfig, "give noise a level from 1 to 5, such as noise@3"),
+        ("noise@6", BadConfig, "give noise a level from 1 to 5"),
+        ("noise@1+noise@2", BadConfig, "noise is in it twice"),
+        ("noise@1+", UnknownName, "no perturbation named ''"),
+    ],
+)
+def test_what_is_no_perturbation_is_refused(text, error, says):
+    with pytest.raises(error, match=says):
+        Perturbation.parse(text)
+
+
+@pytest.mark.parametrize("text", [None, "", "none"])
+def test_nothing_perturbs_nothing(text):
+    assert not Perturbation.parse(text) and str(Perturbation.parse(text)) == "none"
+
+
+@pytest.mark.parametrize(
+    ("observed", "perturb", "says"),
+    [
+        (STREAMS, "camera_fov@1", "affects all cameras, and none is observed"),
+        (["rgb_exo_right_cam"], "wrist_camera@1", "affects wrist cameras, and none is observed"),
+        (["rgb_gripper_cam"], "camera_angle@1", "affects fixed cameras, and none is observed"),
+        (["robot0_eef_pos"], "object_noise@1", "affects streams of object-state, and none is observed"),
+    ],
+)
+def test_a_kind_without_effect_on_what_is_observed_is_refused(observed, perturb, says):
+    with pytest.raises(BadConfig, match=says):
+        PoolEnv("domino_single", REFERENCE, observed, perturb=perturb)
+
+
+@pytest.mark.parametrize("name", kinds())
+def test_a_draw_depends_on_kind_scenario_and_seed_and_a_level_goes_farther_the_same_way(name):
+    one, two = (Perturbation(((name, level),)).of("a").plain()[name] for level in (1, 2))
+    assert (
+        Perturbation((("blur", 1), (name, 1)) if name != "blur" else (("noise", 1), (name, 1))).of("a").plain()[name]
+        == one
+    )
+    assert one != two
+    drawn = [
+        Perturbation(((name, 3),)).of(scenario, seed).plain()[name] for scenario, seed in (("a", 0), ("b", 0), ("a", 1))
+    ]
+    fixed = "sigma" in one or name in ("compression", "shadow")
+    assert fixed or drawn[0] != drawn[1] or drawn[0] != drawn[2]
+
+
+# --- environments -------------------------------------------------------------------------------
+
+
+def seen(perturb, observed, steps=3, **settings):
+    """The observation after some steps, and the state."""
+    env = PoolEnv("domino_single", REFERENCE, observed, width=48, height=48, perturb=perturb, **settings)
+    env.reset(seed=0)
+    for _ in range(steps):
+        observation, *_ = env.step(np.full(7, 0.3))
+    state = env.world.state()
+    env.close()
+    return observation, state
+
+
+@pytest.mark.parametrize(
+    ("perturb", "changed"),
+    [
+        ("proprioception_noise@2", ["robot0_eef_pos", "robot0_eef_quat"]),
+        ("proprioception_bias@2", ["robot0_eef_pos", "robot0_eef_quat"]),
+        ("wrench_noise@2", ["force_torque"]),
+        ("object_noise@2", ["object-state"]),
+        ("wrench_noise@1+object_noise@1", ["force_torque", "object-state"]),
+    ],
+)
+def test_readings_change_and_the_simulation_does_not(perturb, changed):
+    (clean, state), (found, same) = seen(None, STREAMS), seen(perturb, STREAMS)
+    assert (state == same).all()
+    assert [name for name in STREAMS if (clean[name] != found[name]).any()] == changed
+    if "robot0_eef_quat" in changed:
+        assert np.linalg.norm(found["robot0_eef_quat"]) == pytest.approx(1.0, abs=1e-6)
+    again, _ = seen(perturb, STREAMS)
+    other, _ = seen(perturb, STREAMS, perturb_seed=1)
+    assert all((again[name] == found[name]).all() for name in STREAMS)
+    assert any((other[name] != found[name]).any() for name in changed)
+
+
+def test_a_bias_stays_and_noise_does_not():
+    for perturb, stays in (("proprioception_bias@3", True), ("proprioception_noise@3", False)):
+        errors = [
+            seen(perturb, STREAMS, n)[0]["robot0_eef_pos"] - seen(None, STREAMS, n)[0]["robot0_eef_pos"] for n in (2, 9)
+        ]
+        assert np.allclose(*errors, atol=1e-6) == stays
+
+
+@drawing
+@pytest.mark.parametrize("perturb", ["noise@3", "light_direction@3+camera_angle@2"])
+def test_slots_and_copies_perceive_the_same(perturb):
+    observed = [*CAMERAS[:1], "robot0_eef_pos"]
+    settings = {"observations": observed, "width": 48, "height": 48, "perturb": perturb}
+    single, many = (
+        PoolEnv("domino_single", REFERENCE, **settings),
+        PoolVectorEnv("domino_single", REFERENCE, 2, **settings),
+    )
+    single.reset(seed=0)
+    many.reset(seed=0)
+    for _ in range(2):
+        one, *_ = single.step(np.zeros(7))
+        both, *_ = many.step(np.zeros((2, 7)))
+    twin = copy.deepcopy(single)
+    assert all((both[name][0] == one[name]).all() for name in observed)
+    again, *_ = twin.step(np.zeros(7))
+    after, *_ = single.step(np.zeros(7))
+    assert all((again[name] == after[name]).all() for name in observed)
+    for env in (single, many, twin):
+        env.close()
+
+
+def test_episodes_of_an_evaluation_say_what_was_drawn(tmp_path):
+    words = ["evaluate", "policy=idle", f"pool={REFERENCE}", "seeds=1", "rollouts=1", f"to={tmp_path}"]
+    assert cli.run([*words, "perturb=proprioception_bias@4"]) == 0
+    assert '"perturb": {"proprioception_bias": {"bias": 0.007' in (tmp_path / "episodes.jsonl").read_text()
+    assert "perturbed by proprioception_bias@4" in (tmp_path / "table.md").read_text()
+
+
+# --- proofs -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def stage(row):
+    scenario = load_task(row.task).scenario(row.params)
+    with staged(scenario, row.scene_xml, row.embodiment, row.witness) as made:
+        yield made
+
+
+@drawing
+@pytest.mark.parametrize(
+    ("name", "level"), [("light_direction", 2), ("camera_angle", 2), ("noise", 3), ("object_noise", 1)]
+)
+def test_sound_kinds_are_proved(stage, name, level):
+    assert list(stage.proof(kinds()[name], level).faults()) == []
+
+
+def planted(monkeypatch, name, **parts):
+    """A kind with a fault in its effect."""
+    monkeypatch.setattr(perturbation, "EFFECTS", {**EFFECTS, name: replace(EFFECTS[name], **parts)})
+    return kinds()[name]
+
+
+def spare_wrist(change):
+    """A change of cameras that leaves those on wrists out."""
+
+    def spared(model, values):
+        before = {n: model.cam_fovy[n] for n in range(model.ncam) if model.camera(n).name.endswith(EYE)}
+        change(model, values)
+        for number, fovy in before.items():
+            model.cam_fovy[number] = fovy
+
+    return spared
+
+
+def weigh(model, values):
+    model.body_mass[:] *= 1.0001
+
+
+def blind(model, values):
+    model.cam_pos[:] += 5.0
+
+
+FAULTS = {
+    "a dead light": ("light_direction", {"on_model": lambda model, values: None}, "changes by 0"),
+    "the wrist left out": ("camera_fov", {"on_model": spare_wrist(EFFECTS["camera_fov"].on_model)}, "rgb_gripper_cam"),
+    "a picture that is not changed": ("noise", {"on_picture": lambda picture, values, rng: picture}, "changes by 0"),
+    "masses that change": ("table_colour", {"on_model": weigh}, "the physics differs"),
+    "a camera that looks away": ("camera_position", {"on_model": blind}, "is out of sight"),
+    "a patch over everything": ("patch", {"on_picture": lambda picture, values, rng: 0 * picture}, "is out of sight"),
+    "a reading that is not changed": (
+        "object_noise",
+        {"on_reading": lambda n, reading, v, rng: reading},
+        "changes by 0",
+    ),
+    "nothing that it changes": ("noise", {"reads": "sounds"}, "it changes nothing"),
+}
+
+
+@drawing
+@pytest.mark.parametrize("fault", FAULTS)
+def test_planted_faults_are_found(stage, monkeypatch, fault):
+    name, parts, says = FAULTS[fault]
+    told = list(stage.proof(planted(monkeypatch, name, **parts), 3).faults())
+    assert any(says in each for each in told), told
+
+
+@drawing
+def test_a_scene_is_left_as_it_was(stage):
+    model, before = stage.world.model, perturbation.arrays(stage.world.model)
+    for name, kind in kinds().items():
+        if kind.effect.reads == PICTURES:
+            with Perturbation(((name, 5),)).of("a").while_applied(model):
+                pass
+    assert all(array.tobytes() == before[name].tobytes() for name, array in perturbation.arrays(model).items())
+    assert effects._key(model) >= 0 and isinstance(model, mujoco.MjModel)
+
+
+@drawing
+def test_a_sheet_shows_each_level_beside_the_clean_picture(tmp_path, capsys):
+    target = tmp_path / "sheet.png"
+    words = ["show", "perturb", f"pool={REFERENCE}", "id=8ed4", "perturb=blur+shadow", f"to={target}", "size=32"]
+    assert cli.run(words) == 0 and target.stat().st_size > 1000
+    assert "blur: 0.6" in capsys.readouterr().out
+    assert cli.run([*words, "perturb=wrist_camera"]) == 2
+    assert "affects wrist cameras" in capsys.readouterr().err
