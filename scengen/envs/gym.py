@@ -366,7 +366,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self.close()
             self._world = stored_world(row, self._needs_pictures)
             self._scenario = self.task.scenario(row.params)
-            self.drawn = self.perturbation.of(row.id, self._perturb_seed)
+            bodies = [self._world.model.body(number).name for number in range(self._world.model.nbody)]
+            self.drawn = self.perturbation.of(row.id, self._perturb_seed, bodies)
             if self._needs_pictures:
                 self.drawn.on_model(self._world.model)
         self._row = row

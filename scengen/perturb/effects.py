@@ -247,9 +247,7 @@ def _bias(entries: Sequence[str], reading: Reading, values: Values, rng: Random)
 
 
 def _erring(entries: Sequence[str], reading: Reading, error: Reading) -> Reading:
-    """A reading with errors. Zeros stay: they stand for bodies that a scene lacks."""
-    scales = np.array([_scale_of(entry) for entry in entries]).reshape(reading.shape)
-    found = np.where(reading == 0.0, 0.0, reading + scales * error)
+    found = reading + np.array([_scale_of(entry) for entry in entries]).reshape(reading.shape) * error
     quats = [number for number, entry in enumerate(entries) if entry.rpartition(".")[0].endswith("quat")]
     for start in quats[::4]:
         part = found[start : start + 4]

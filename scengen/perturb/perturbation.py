@@ -5,7 +5,7 @@ strength on the level: the same scenario looks the same in each episode, in each
 perturbation, and a higher level goes farther in the same direction.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -136,17 +136,20 @@ class Perturbation:
             if not seen:
                 raise BadConfig(f"perturb = {name}@{level} affects {what}")
 
-    def of(self, scenario: str, seed: int = 0) -> "Drawn":
+    def of(self, scenario: str, seed: int = 0, bodies: Iterable[str] = ()) -> "Drawn":
         """What is drawn for a scenario.
 
         Args:
             scenario: its id.
+            bodies: names of the bodies of its scene. Readings of others stay 0.
         """
         values = {}
         for name, level in self.parts:
             rng = _random("draw", name, scenario, seed)
             values[name] = kinds()[name].effect.draw(kinds()[name].strengths[level - 1], rng)
-        return Drawn(self, scenario, seed, values)
+        return Drawn(
+            self, scenario, seed, values, tuple(f"{start}{body}_" for body in bodies for start in ("", "seen_"))
+        )
 
 
 @dataclass(frozen=True)
@@ -158,6 +161,8 @@ class Drawn:
     seed: int
     values: Mapping[str, Values]
     """Drawn values by kind."""
+    starts: tuple[str, ...] = ()
+    """Beginnings of the names of readings of bodies that the scene has."""
 
     @cached_property
     def effects(self) -> Mapping[str, Effect]:
@@ -213,8 +218,13 @@ class Drawn:
         for name, values in self.values.items():
             effect = self.effects[name]
             if effect.on_reading is not None and stream_kind(stream) == effect.reads:
-                reading = effect.on_reading(entries, reading, values, self._rng(name, stream, period))
+                found = effect.on_reading(entries, reading, values, self._rng(name, stream, period))
+                reading = np.where(self._there(entries), found, reading) if effect.reads == OBJECTS else found
         return reading
+
+    def _there(self, entries: Sequence[str]) -> NDArray[np.bool_]:
+        """Whether the scene has the body of each entry."""
+        return np.array([entry.startswith(self.starts) for entry in entries])
 
     def _rng(self, name: str, what: str, period: int) -> np.random.Generator:
         return _random("use", name, dict(self.perturbation.parts)[name], self.scenario, self.seed, what, period)

@@ -84,7 +84,7 @@ class Stage:
 
     def proof(self, kind: Kind, level: int) -> Proof:
         """Try a kind at a level."""
-        drawn = Perturbation(((kind.name, level),)).of(self.scenario.id)
+        drawn = Perturbation(((kind.name, level),)).of(self.scenario.id, bodies=self.world.free_bodies)
         with drawn.while_applied(self.world.model) as changed:
             neutral = all(name.startswith(SEEN) for name in changed)
             if kind.effect.reads != PICTURES:
