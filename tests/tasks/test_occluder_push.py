@@ -1,4 +1,4 @@
-"""Lids hide the cubes from every camera, come off without taking the cubes along, and a wrong cube is the end."""
+"""Lids hide the cubes from every camera, come off without taking the cubes along, and one wrong cube is too many."""
 
 import math
 from dataclasses import dataclass, replace
