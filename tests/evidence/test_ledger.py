@@ -179,7 +179,7 @@ def of_another_version(empty):
 def test_no_page_shows_figures_of_another_version(of_another_version):
     none = "not measured on version 1"
     assert set(tables.of_axes(TASK.name)["diagonal"].values()) <= {none, "nothing hidden"}
-    assert all(not ledger.current(kind, TASK.name) for kind in KINDS)
+    assert all(not ledger.newest(kind, TASK.name) for kind in KINDS)
     assert tables.reports() == {} and f"`{TASK.name}`: {none}" in tables.attacks()["attacks"]
     assert f"| [{TASK.name}](tasks/{TASK.name}.md) | {none} |" in baselines_page._all_splits()
     assert not baselines_page._trainings(MIXED)
