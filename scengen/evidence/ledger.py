@@ -123,10 +123,11 @@ def read(kind: Kind, task: str) -> list[Evidence]:
 
 
 def newest(kind: Kind, task: str) -> list[Evidence]:
-    """The rows of a kind about an installed task, of the newest version that has any. `mark` says which, if it is not
-    today's."""
+    """The rows of a kind about an installed task: for each split, those of the newest version that has any. `mark` says
+    which that is, if it is not today's."""
     rows = [row for row in read(kind, task) if row.version <= version_of(task)]
-    return [row for row in rows if row.version == max(one.version for one in rows)]
+    last = {row.split: row.version for row in sorted(rows, key=lambda row: row.version)}
+    return [row for row in rows if row.version == last[row.split]]
 
 
 def mark(row: Evidence) -> str:
