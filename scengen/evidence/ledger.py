@@ -131,7 +131,7 @@ def newest(kind: Kind, task: str) -> list[Evidence]:
 
 
 def mark(row: Evidence) -> str:
-    """What a page adds to the figures of a row about another version than today's; else nothing."""
+    """What a page adds to the figures of a row about an earlier version of its task; else nothing."""
     return "" if row.version == version_of(row.task) else f" (version {row.version})"
 
 
