@@ -109,7 +109,7 @@ def _rates() -> dict[str, Rates]:
 @cache
 def _measured() -> dict[str, list[Evidence]]:
     """The rows of each task that has some."""
-    every = {task: ledger.current("baseline", task) for task in list_tasks()}
+    every = {task: ledger.newest("baseline", task) for task in list_tasks()}
     return {task: rows for task, rows in every.items() if rows}
 
 
@@ -122,7 +122,7 @@ def _summary() -> str:
     lines, every, count = [], [], 0
     for task in _rates():
         own, axes = [*means(task).values()], len(load_task(task).axes)
-        lines.append([f"[{task}](tasks/{task}.md)", str(axes), *map(_arrow, own)])
+        lines.append([f"[{task}](tasks/{task}.md){ledger.mark(_measured()[task][0])}", str(axes), *map(_arrow, own)])
         every.append(own)
         count += axes
     lines.append(["**mean**", str(count), *map(_arrow, np.mean(every, axis=0))])
@@ -145,7 +145,7 @@ def _all_splits() -> str:
 def _trainings(*sets: str) -> dict[str, list[Evidence]]:
     """Rows of trainings on some sets of demonstrations, as they are made today, by task."""
     today = {"epochs": TrainSettings().epochs}
-    known = {task: ledger.current("training", task) for task in list_tasks()}
+    known = {task: ledger.newest("training", task) for task in list_tasks()}
     chosen = {
         task: [row for row in own if row.made_with["data"] in sets and row.has(**today)] for task, own in known.items()
     }
@@ -158,7 +158,7 @@ def _learning_curves() -> str:
     for task, known in _trainings(MIXED).items():
         for split, policy in product(_splits(task, known), POLICIES):
             cells = (_spread(_learned(task, split, policy, size)) for size in _sizes())
-            lines.append([f"[{task}](tasks/{task}.md)", split, policy, *cells])
+            lines.append([f"[{task}](tasks/{task}.md){ledger.mark(known[0])}", split, policy, *cells])
     columns = ("task", "split", "policy", *(f"{size} demonstrations" for size in _sizes()))
     return table(columns, lines)
 

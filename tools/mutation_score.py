@@ -69,12 +69,12 @@ def main(budget: str = "500", *tasks: str) -> None:
 
 def stored() -> list[Evidence]:
     """The rows about today's tasks and plans."""
-    return [row for task in TASKS for row in ledger.current("mutation", task) if counts(row)]
+    return [row for task in TASKS for row in ledger.newest("mutation", task) if counts(row)]
 
 
 def done(task: Task, mutant: str) -> bool:
     """Whether the ledger has a mutant of a task, or with an empty name its varied runs."""
-    rows = [row for row in ledger.current("mutation", task.name) if row.has(mutant=mutant) and counts(row)]
+    rows = [row for row in ledger.newest("mutation", task.name) if row.has(mutant=mutant) and counts(row)]
     return any(not measuring.stale(task, row) for row in rows)
 
 

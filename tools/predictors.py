@@ -203,7 +203,7 @@ class Trial:
 def _trials() -> list[Trial]:
     """All axes on which a learner was tried that works in training."""
     found = []
-    for task in (load_task(name) for name in list_tasks() if ledger.current("baseline", name)):
+    for task in (load_task(name) for name in list_tasks() if ledger.newest("baseline", name)):
         cards = figures.cards(task.name)
         for axis, baselines in figures.baselines(task).items():
             learner = next((baselines[name] for name in LEARNERS if name in baselines), None)

@@ -148,7 +148,7 @@ def _verdicts(words: Sequence[str]) -> str:
 
 
 def _cpu(task: str, row: Evidence | None) -> str:
-    return f"{row.value['cpu']:.1f}" if row else ledger.not_measured(task)
+    return f"{row.value['cpu']:.1f}{ledger.mark(row)}" if row else ledger.not_measured(task)
 
 
 # --- docs/cluster.md --------------------------------------------------------------------------
@@ -157,10 +157,10 @@ def _cpu(task: str, row: Evidence | None) -> str:
 def cluster() -> dict[str, str]:
     """The table of docs/cluster.md: costs of pools of the training split."""
     rows = {task: figures.certified(task).get(ID) for task in list_tasks()}
-    each = {task: row.value["cpu"] for task, row in rows.items() if row}
-    lines = [_cost(link(task), cpu) for task, cpu in sorted(each.items(), key=lambda pair: pair[1])]
-    lines += [[link(task), ledger.not_measured(task), "-", "-", "-"] for task in rows if task not in each]
-    lines += [_cost("mean over measured tasks", sum(each.values()) / len(each))] if each else []
+    found = sorted((row.value["cpu"], task, ledger.mark(row)) for task, row in rows.items() if row)
+    lines = [_cost(f"{link(task)}{mark}", cpu) for cpu, task, mark in found]
+    lines += [[link(task), ledger.not_measured(task), "-", "-", "-"] for task, row in rows.items() if not row]
+    lines += [_cost("mean over measured tasks", sum(cpu for cpu, *_ in found) / len(found))] if found else []
     return {"costs": table(COSTS, lines)}
 
 
@@ -174,7 +174,7 @@ def _cost(what: str, cpu: float) -> list[str]:
 
 def drift() -> dict[str, str]:
     """The results of all tasks, by the set of versions."""
-    rows = [row for task in list_tasks() for row in ledger.current("drift", task)]
+    rows = [row for task in list_tasks() for row in ledger.newest("drift", task)]
     sets = sorted({tuple(row.made_with["mujoco"]) for row in rows})
     return {"drift": "\n".join(_drifted(names, [row for row in rows if row.has(mujoco=[*names])]) for names in sets)}
 
@@ -212,7 +212,7 @@ def _compared(task: str, versions: Sequence[str], rows: Sequence[Evidence]) -> l
     if not rows:
         return [link(task), "0", *[ledger.not_measured(task)] * len(versions)]
     counts = [total([row.value["counts"][version] for row in rows]) for version in versions]
-    return [link(task), str(sum(row.n for row in rows)), *map(cell, counts)]
+    return [link(task), f"{sum(row.n for row in rows)}{ledger.mark(rows[0])}", *map(cell, counts)]
 
 
 def _bound(told: Mapping[str, Any]) -> float:
@@ -234,8 +234,9 @@ def cheats() -> Iterator[list[str]]:
     for (task, cheat), hand in HANDS.items():
         number, _, idea = str(importlib.import_module(f"hands.{task}").__doc__).partition(":")
         name, idea = (f"{number} {link(task)}", " ".join(idea.split())) if task != last else ("", "")
-        rows = [row for row in ledger.current("cheat", task) if row.has(cheat=cheat, draws=recall.DRAWS)]
-        counts = [f"{rows[0].value[part]} of {recall.DRAWS}" for part in ("closed", "open")] if rows else []
+        rows = [row for row in ledger.newest("cheat", task) if row.has(cheat=cheat, draws=recall.DRAWS)]
+        parts = ("closed", "open") if rows else ()
+        counts = [f"{rows[0].value[part]} of {recall.DRAWS}{ledger.mark(rows[0])}" for part in parts]
         plan = cheat.removesuffix("_raw").replace("_", " ") + (", raw" if hand.raw else "")
         yield [name, idea, plan, *(counts or [ledger.not_measured(task)] * 2), found_by(task, hand)]
         last = task
@@ -244,7 +245,7 @@ def cheats() -> Iterator[list[str]]:
 def found_by(task: str, hand: Hand) -> str:
     """The tiers that find a way without a cheat's mend. Cheats with the same mend share them."""
     mended = {cheat for (name, cheat), other in HANDS.items() if name == task and other.unmended == hand.unmended}
-    rows = [row for row in ledger.current("recall", task) if row.has(grammar=GRAMMAR)]
+    rows = [row for row in ledger.newest("recall", task) if row.has(grammar=GRAMMAR)]
     found = next((row.value["found"] for row in rows if row.made_with["cheat"] in mended), None)
     return ledger.not_measured(task) if found is None else found.partition(":")[0] or "nothing"
 

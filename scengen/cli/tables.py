@@ -10,6 +10,7 @@ from rich.table import Table
 from ..attack.campaign import AttackReport
 from ..attack.evidence import TierRate, spelled
 from ..certificate import STAGES
+from ..evidence import ledger
 from ..evidence.ledger import Evidence
 from ..pool import Pool, PoolRow
 from ..runs.generate import Summary
@@ -127,7 +128,9 @@ def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Evi
     for task, after in zip_longest(tasks, tasks[1:]):
         rows = certified[task.name]
         results = [row.value for row in rows.values()]
-        share = f"{sum(t['certified'] for t in results)} of {sum(t['indices'] for t in results)}" if results else "-"
+        old = "*" if any(map(ledger.mark, rows.values())) else ""
+        counts = (sum(each[what] for each in results) for what in ("certified", "indices"))
+        share = f"{' of '.join(map(str, counts))}{old}" if results else "-"
         each = f"{rows[ID].value['cpu']:.1f}" if ID in rows else "-"
         hands = task.embodiment.replace("panda_", "")
         cells = (task.name, hands, str(len(task.axes)), share, each, task.instruction)
@@ -136,7 +139,7 @@ def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Evi
         )
     table.caption = (
         "certified: of the tried draws; CPU s: for one certificate in training, level quick; "
-        "-: not measured on the task's version of today"
+        "*: measured on an earlier version of the task; -: not measured"
     )
     table.caption_justify = "left"
     return table

@@ -10,7 +10,7 @@ import json
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -102,15 +102,15 @@ class Behaviour:
 
     def write(self, path: Path) -> None:
         """Write the file: one line for each draw, limit, state and rollout."""
-        parts = [f'"format": {FORMAT}']
+        parts, dense = [f'"format": {FORMAT}'], partial(json.dumps, separators=(",", ":"))
         for name, value in asdict(self).items():
             if isinstance(value, Mapping) and value:
-                lines = [f"{json.dumps(key)}: {json.dumps(each)}" for key, each in value.items()]
+                lines = [f"{dense(key)}: {dense(each)}" for key, each in value.items()]
                 parts.append(f'"{name}": {{\n' + ",\n".join(lines) + "\n}")
             elif isinstance(value, (list, tuple)) and value:
-                parts.append(f'"{name}": [\n' + ",\n".join(map(json.dumps, value)) + "\n]")
+                parts.append(f'"{name}": [\n' + ",\n".join(map(dense, value)) + "\n]")
             else:
-                parts.append(f'"{name}": {json.dumps(value)}')
+                parts.append(f'"{name}": {dense(value)}')
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("{\n" + ",\n".join(parts) + "\n}\n")
 

@@ -123,15 +123,22 @@ def read(kind: Kind, task: str) -> list[Evidence]:
     return list(_rows(path)) if path.is_file() else []
 
 
-def current(kind: Kind, task: str) -> list[Evidence]:
-    """The rows of a kind about today's version of an installed task."""
-    rows = read(kind, task)
-    return [row for row in rows if row.version == version_of(task)] if rows else []
+def newest(kind: Kind, task: str) -> list[Evidence]:
+    """The rows of a kind about an installed task: for each split, those of the newest version that has any. `mark` says
+    which that is, if it is not today's."""
+    rows = [row for row in read(kind, task) if row.version <= version_of(task)]
+    last = {row.split: row.version for row in sorted(rows, key=lambda row: row.version)}
+    return [row for row in rows if row.version == last[row.split]]
+
+
+def mark(row: Evidence) -> str:
+    """What a page adds to the figures of a row about an earlier version of its task; else nothing."""
+    return "" if row.version == version_of(row.task) else f" (version {row.version})"
 
 
 def latest(kind: Kind, task: str, **made_with: Any) -> dict[str, Evidence]:
-    """The row about today's version of a task on each split: of those with these settings, that with the largest n."""
-    rows = [row for row in current(kind, task) if row.has(**made_with)]
+    """The newest row of a task on each split: of those with these settings, that with the largest n."""
+    rows = [row for row in newest(kind, task) if row.has(**made_with)]
     return {row.split: row for row in sorted(rows, key=lambda row: row.n)}
 
 
@@ -149,7 +156,7 @@ def write(row: Evidence) -> None:
 
 
 def not_measured(task: str) -> str:
-    """What a page says where there is no row about today's version of a task."""
+    """What a page says where there is no row about a task."""
     return f"not measured on version {version_of(task)}"
 
 

@@ -57,7 +57,7 @@ def table(titles: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
 
 def certified(task: str) -> dict[str, Evidence]:
     """The row of certification at level `quick` of each split."""
-    rows = [row for row in ledger.current("certified", task) if "level" not in row.made_with]
+    rows = [row for row in ledger.newest("certified", task) if "level" not in row.made_with]
     return {row.split: row for row in sorted(rows, key=lambda row: row.n)}
 
 
@@ -70,7 +70,7 @@ def certification(task: str, row: Evidence | None) -> list[str]:
         oracle = f"{found['solved']} of {found['draws']} (> {100 * lower_bound(found['solved'], found['draws']):.0f}%)"
     if found.get("replays"):
         same = f"{found['same']} of {found['replays']}"
-    return [f"{found['certified']} of {found['indices']}", oracle, same]
+    return [f"{found['certified']} of {found['indices']}{ledger.mark(row)}", oracle, same]
 
 
 # --- axes -------------------------------------------------------------------------------------
@@ -91,6 +91,7 @@ def axis_cells(
     outside, physics, replay_ends, oracle_ends, energy = [none] * 5
     if card:
         outside = "another value" if card["outside"] is None else f"{card['outside']:.2g}"
+        outside += marked_cards(task.name, axis)
         physics = ", ".join(card["leaving"]) or "stays"
         replay_ends, oracle_ends, energy = *card["boundaries"].values(), str(Energy(**card["energy"]))
     cells = [baseline_cell(found[name]) if name in found else none for name in BASELINES]
@@ -128,6 +129,12 @@ def _count(rate: Rate) -> int:
     return round(rate.value * rate.rollouts)
 
 
+def marked_cards(task: str, axis: str) -> str:
+    """The mark of the rows of an axis, as of `ledger.mark`."""
+    rows = [row for kind in ("axis", "belief") for row in ledger.newest(kind, task) if row.split == axis]
+    return max(map(ledger.mark, rows), default="")
+
+
 def cards(task: str) -> dict[str, Mapping[str, Any]]:
     """Figures of the card of each axis that has one."""
     return {axis: row.value for axis, row in ledger.latest("axis", task).items()}
@@ -136,7 +143,7 @@ def cards(task: str) -> dict[str, Mapping[str, Any]]:
 def baselines(task: Task) -> dict[str, dict[str, Baseline]]:
     """The baselines of every axis by name: of two rows about one, that with more twins; and the task's learner."""
     found: dict[str, dict[str, Baseline]] = {axis: {} for axis in task.axes}
-    for row in (*ledger.current("axis", task.name), *ledger.current("belief", task.name)):
+    for row in (*ledger.newest("axis", task.name), *ledger.newest("belief", task.name)):
         for one in map(Baseline.of_record, row.value["baselines"]):
             known = found[row.split].get(one.name)
             if known is None or one.twins >= known.twins:
@@ -152,7 +159,7 @@ def learners(task: Task) -> dict[str, Baseline]:
     It is the policy that solves most training scenarios, so that its failures elsewhere show most; of several, the
     first one of `LEARNERS`.
     """
-    known = ledger.current("baseline", task.name)
+    known = ledger.newest("baseline", task.name)
     played = {
         (name, split): outcomes(row for row in known if row.split == split and row.has(policy=name))
         for name in LEARNERS
@@ -189,9 +196,9 @@ def _learner(name: str, training: Mapping[int, list[bool]], here: Mapping[int, l
 
 def attack(task: str, rules: str = STRICT) -> Mapping[str, Any] | None:
     """The report on a task that was attacked: by the newest grammar of plans, and with the most rollouts."""
-    rows = [row for row in ledger.current("attack", task) if row.has(rules=rules)]
-    newest = max(rows, key=lambda row: (row.made_with["grammar"], row.value["rollouts"]), default=None)
-    return newest.value if newest else None
+    rows = [row for row in ledger.newest("attack", task) if row.has(rules=rules)]
+    last = max(rows, key=lambda row: (row.made_with["grammar"], row.value["rollouts"]), default=None)
+    return {**last.value, "mark": ledger.mark(last)} if last else None
 
 
 def attack_cells(report: Mapping[str, Any]) -> list[str]:
@@ -202,7 +209,7 @@ def attack_cells(report: Mapping[str, Any]) -> list[str]:
         *(_counted(report, tier) for tier in ("memory_1", "memory_2")),
         *(fixed.get(count, "-") for count in (1, 2, 3)),
         *(_counted(report, *tiers) for tiers in (("retry",), ("detour", "witness", "search"))),
-        str(report["rollouts"]),
+        f"{report['rollouts']}{report['mark']}",
         str(len(report["hits"])),
     ]
 
@@ -224,7 +231,7 @@ def _share(prior: Mapping[str, Any]) -> str:
 
 def policies(task: Task) -> Iterator[list[str]]:
     """The figures of policies: one line for each split and policy that was measured."""
-    rows = ledger.current("baseline", task.name)
+    rows = ledger.newest("baseline", task.name)
     for split, policy in product((ID, *task.axes), (*SHOWN, *UNTRAINED)):
         if own := trainings_of(rows, policy, split):
             yield _of_policy(own)
@@ -247,4 +254,4 @@ def _of_policy(rows: Sequence[Evidence]) -> list[str]:
     policy, epochs = first.made_with["policy"], first.made_with.get("epochs")
     if policy in (BC, MIP) and epochs != TrainSettings().epochs:
         policy += f", {epochs} epochs"
-    return [first.split, policy, f"{solved} of {first.n}", shown, why]
+    return [first.split, policy, f"{solved} of {first.n}{ledger.mark(first)}", shown, why]

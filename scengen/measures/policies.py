@@ -215,7 +215,7 @@ class Trainings(_OfPolicies):
     def chosen(self, task: Task) -> tuple[str, ...]:
         if self.splits:
             return super().chosen(task)
-        before = {row.split for row in ledger.current(self.KIND, task.name)}
+        before = {row.split for row in ledger.newest(self.KIND, task.name)}
         return (ID, *([axis for axis in task.axes if axis in before] or [*task.axes][:AXES]))
 
     def jobs(self, task: Task) -> Iterator[Job]:

@@ -119,7 +119,7 @@ class CrackerBoxSuction(BoxAndSlot):
 
     def by_broad_face(self, world: World) -> bool:
         """Whether the cup pulls at a broad face of the box."""
-        facing_it = abs(world.arm.hand_rot[:, 2] @ world.rot("box")[:, 0]) > math.cos(LEANING)
+        facing_it = abs(float(world.arm.hand_rot[:, 2] @ world.rot("box")[:, 0])) > math.cos(LEANING)
         return facing_it and world.arm.grips("box")
 
     # --- oracle ---------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from scipy.special import betaincinv
 from .. import html_tables
 from ..certificate import CHECKS, NOT_CHECKED, Certificate, Check
 from ..control.loop import Loop
-from ..episode import Actions, Episode
+from ..episode import PAPER, Actions, Episode
 from ..errors import BadConfig, ScengenError
 from ..geometry import Mat3, Vec3
 from ..scenario import Plan, Planner, Scenario
@@ -198,12 +198,14 @@ class Trial:
         return {}, {}, "the goal holds after settling" if self.solved_after_rest else ""
 
     def _idle(self) -> "Finding":
-        """Whether doing nothing reaches the goal. It may end at rest, after the seconds of the check `rest`."""
+        """Whether doing nothing reaches the goal in any way. It may end at rest, after the seconds of `rest`."""
 
         def wait(world: World) -> Plan:
             yield from repeat(world.idle, round(self.settings.rest.seconds / Loop.PERIOD))
 
-        episode = run(self.scenario, self.world, wait, self.horizon, self.settings.settle, until_settled=True)
+        episode = run(
+            self.scenario, self.world, wait, self.horizon, self.settings.settle, until_settled=True, rules=PAPER
+        )
         settings = {"horizon": self.horizon}
         return settings, _outcome(episode), "doing nothing reaches the goal" if episode.solved else ""
 
@@ -225,7 +227,8 @@ class Trial:
                 if tried.solved:
                     return {}, numbers, f"{name!r} reaches the goal ({how})"
                 if tried.outcome == "unstable" or (shortcut.to_rest and tried.reason != AT_REST):
-                    return {}, numbers, f"{name!r} was not seen to its end ({how}): {tried.reason}"
+                    seen = "reaches the goal" if tried.lacks else "was not seen to its end"
+                    return {}, numbers, f"{name!r} {seen} ({how}): {tried.reason}"
         return {}, numbers, ""
 
     def _robust(self) -> "Finding":

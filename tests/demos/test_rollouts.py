@@ -10,9 +10,9 @@ import pytest
 from helpers import REFERENCE
 
 from scengen import cli
+from scengen.means import throughout
 from scengen.pool import Pool
 from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations
-from scengen.means import throughout
 from scengen.tasks.domino_single import DominoSingle
 
 

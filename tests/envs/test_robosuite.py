@@ -295,7 +295,8 @@ def test_the_goal_must_hold_and_then_stays_reached(env, stub):
     assert env.step(IDLE)[1] == 1.0
     stub.reached = False
     _, reward, _, info = env.step(IDLE)
-    assert reward == env.reward() == 1.0 and info == {"scenario": env.row.id, "success": True, "reason": ""}
+    told = {"scenario": env.row.id, "success": True, "reason": "", "lacks": ""}
+    assert reward == env.reward() == 1.0 and info == told
 
 
 def test_a_failure_is_final(env, stub):

@@ -21,7 +21,7 @@ from scengen.samplers import task_files
 
 TASK = load_task("domino_single")
 ROWS = [row for kind in KINDS for task in list_tasks() for row in ledger.read(kind, task)]
-ROW = Evidence(TASK.name, 1, "id", "plan", 3, {"solved": 2}, {"seed": 0}, measuring.draws_of(TASK, "id"))
+ROW = Evidence(TASK.name, TASK.version, "id", "plan", 3, {"solved": 2}, {"seed": 0}, measuring.draws_of(TASK, "id"))
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def test_what_was_measured_with_the_same_settings_is_not_measured_again(empty, m
     assert measuring.measured(TASK, "id", "plan", {**made_with, "n": 3}) is None
     assert measuring.measured(TASK, "diagonal", "plan", made_with) is None
     assert measuring.measured(TASK, "id", "drift", made_with) is None
-    monkeypatch.setattr(TASK.family, "VERSION", 2)
+    monkeypatch.setattr(TASK.family, "VERSION", TASK.version + 1)
     assert measuring.measured(TASK, "id", "plan", made_with) is None
 
 
@@ -111,9 +111,19 @@ def test_the_draws_tell_distributions_apart_and_scenes(monkeypatch):
 
 def test_a_row_of_the_same_settings_is_replaced_and_others_stay(empty):
     other = replace(ROW, made_with={"seed": 1})
-    for row in (ROW, other, replace(ROW, version=2, n=5)):
+    newer = replace(ROW, version=ROW.version + 1, n=5)
+    for row in (ROW, other, newer):
         ledger.write(row)
-    assert ledger.read("plan", TASK.name) == [replace(ROW, version=2, n=5), other]
+    assert ledger.read("plan", TASK.name) == [newer, other]
+
+
+def test_pages_show_the_newest_rows_of_each_split_and_mark_old_ones(empty):
+    old = replace(ROW, version=1, made_with={"seed": 1})
+    diagonal, later = replace(old, split="diagonal"), replace(ROW, version=TASK.version + 1, made_with={"seed": 2})
+    for row in (old, ROW, diagonal, later):
+        ledger.write(row)
+    assert sorted(ledger.newest("plan", TASK.name), key=lambda row: row.split) == [diagonal, ROW], "none of the future"
+    assert ledger.mark(ROW) == "" and ledger.mark(diagonal) == " (version 1)"
 
 
 def test_rows_that_are_written_at_once_are_all_kept(empty):
@@ -179,7 +189,7 @@ def of_another_version(empty):
 def test_no_page_shows_figures_of_another_version(of_another_version):
     none = "not measured on version 1"
     assert set(tables.of_axes(TASK.name)["diagonal"].values()) <= {none, "nothing hidden"}
-    assert all(not ledger.current(kind, TASK.name) for kind in KINDS)
+    assert all(not ledger.newest(kind, TASK.name) for kind in KINDS)
     assert tables.reports() == {} and f"`{TASK.name}`: {none}" in tables.attacks()["attacks"]
     assert f"| [{TASK.name}](tasks/{TASK.name}.md) | {none} |" in baselines_page._all_splits()
     assert not baselines_page._trainings(MIXED)

@@ -215,7 +215,7 @@ def test_another_order_of_rules_is_noticed(monkeypatch):
 
     def goal_first(self):
         if self.outcome is None and self.scenario.success(self.world):
-            monkeypatch.setattr(self.scenario, "now", (True, None))
+            monkeypatch.setattr(self.scenario, "now", (True, None, True))
         return judge(self)
 
     episodes.episodes_sha256.cache_clear()

@@ -106,9 +106,9 @@ def test_of_several_tasks_one_is_chosen(mine):
         TrainingData.read(mine, task="packin")
 
 
-@pytest.mark.parametrize("told", [[1, 2, 1], [1, None, 1], [0, 0, 0], ["1", "1", "1"]])
+@pytest.mark.parametrize("told", [[2, 1, 2], [2, None, 2], [0, 0, 0], ["2", "2", "2"]])
 def test_a_recording_has_one_version_of_its_task(mine, told):
-    assert TrainingData.read(mine).task_version == 1
+    assert TrainingData.read(mine).task_version == 2
     rewrite_versions(mine, told)
     with pytest.raises(PoolError, match="scengen/task_version of domino_single is not one number"):
         TrainingData.read(mine)
@@ -118,7 +118,7 @@ def test_a_recording_of_an_earlier_release_has_an_unknown_version(mine, tmp_path
     rewrite_versions(mine, None)
     assert TrainingData.read(mine).task_version is None
     assert cli.run(["train", "policy=knn", f"data={mine}", f"to={tmp_path / 'policy'}"]) == 0
-    assert "recorded with an unknown version of domino_single; installed: 1" in capsys.readouterr().err
+    assert "recorded with an unknown version of domino_single; installed: 2" in capsys.readouterr().err
     assert read_settings(tmp_path / "policy").task_version is None
 
 

@@ -65,7 +65,7 @@ def test_rows_of_another_level_are_not_those_of_the_pages(tmp_path, counted):
     words = ("kind=certified", "task=domino_single", "splits=id,diagonal", "level=full", f"records={tmp_path}")
     assert cli.run(("measure", *words)) == 0 and counted == ["id", "diagonal"]
     with ledger.opened(str(tmp_path)):
-        assert ledger.current("certified", "domino_single") and figures.certified("domino_single") == {}
+        assert ledger.newest("certified", "domino_single") and figures.certified("domino_single") == {}
 
 
 def test_more_twins_replace_fewer(tmp_path, monkeypatch):

@@ -98,7 +98,7 @@ def test_a_pool_with_other_scenarios_is_refused(edition):
     ("old", "new", "says"),
     [
         ("format: 2", "format: 1", "has format 1; this version reads format 2"),
-        ("  domino_single: 1\n", "  packing: 1\n", "task_versions must have the tasks of the sets"),
+        ("  domino_single: 2\n", "  packing: 2\n", "task_versions must have the tasks of the sets"),
         ("n: 6", "n: 7", "must have 7 scenarios"),
         ("seed: 0", "seed: zero", "seed = 'zero'; it must be a whole number"),
         ("  - 0 ", "  - x", "is not a scenario"),
@@ -166,16 +166,16 @@ def test_missing_pools_are_made_and_finished_ones_are_not_made_again(edition, mo
 
 
 def test_an_edition_names_the_versions_of_its_tasks_and_tells_of_another_one(edition, monkeypatch, capsys):
-    assert Edition.read(str(edition.path)).task_versions == {"domino_single": 1}
+    assert Edition.read(str(edition.path)).task_versions == {"domino_single": 2}
     assert list(edition.other_versions([KEY])) == []
-    monkeypatch.setattr(DominoSingle, "VERSION", 2)
+    monkeypatch.setattr(DominoSingle, "VERSION", 3)
     (line,) = edition.other_versions([KEY, "packing/id"])
-    assert line == "edition mine is frozen at version 1 of domino_single; installed: 2"
+    assert line == "edition mine is frozen at version 2 of domino_single; installed: 3"
     assert cli.run(["edition", f"edition={edition.path}", "tasks=domino_single"]) == 0, "the same scenes are drawn"
     assert line in capsys.readouterr().err
-    with pytest.raises(BadConfig, match="installed: 2; a task has one version in an edition"):
+    with pytest.raises(BadConfig, match="installed: 3; a task has one version in an edition"):
         edition.with_set("domino_single/diagonal", POOL)
-    assert replace(edition, task_versions={}, sets={}).with_set(KEY, POOL).task_versions == {"domino_single": 2}
+    assert replace(edition, task_versions={}, sets={}).with_set(KEY, POOL).task_versions == {"domino_single": 3}
 
 
 def test_a_line_of_the_file_is_a_scenario():

@@ -388,10 +388,10 @@ def test_the_code_that_made_a_pool_decides_nothing(mine):
 
 
 def test_a_pool_of_another_version_that_reproduces_is_sound_and_says_so(mine):
-    made_with(mine, task_version=2)
+    made_with(mine, task_version=3)
     report = examined(mine)
-    assert (report.verdict, report.sound, report.claimed, report.versions) == ("sound", 3, 0, [2, 1])
-    assert any("certified against version 2 of domino_single; installed: 1" in remark for remark in report.remarks)
+    assert (report.verdict, report.sound, report.claimed, report.versions) == ("sound", 3, 0, [3, 2])
+    assert any("certified against version 3 of domino_single; installed: 2" in remark for remark in report.remarks)
 
 
 def test_what_differs_from_another_version_is_a_claim(mine, monkeypatch):

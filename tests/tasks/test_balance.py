@@ -10,29 +10,34 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     not_certified,
     play,
     play_shortcut,
     replayed,
     unchecked,
-    unguarded,
 )
 from rods import left_alone, on_ridge
 
 from scengen import load_task
 from scengen.assets.inlaid_rod import InlaidRod
 from scengen.assets.ridge import Ridge
+from scengen.episode import OTHERWISE, PAPER
 from scengen.geometry import UP, about_z
 from scengen.params import parameters
 from scengen.predicates import rests_on
 from scengen.skills.jaw import grasp, release
 from scengen.tasks.balance import MAX_FALL_SPEED, MAX_TILT, RELEASE_TIME, RIDGE, UprightRod
+from scengen.validate.rollout import AT_REST, run
 
 MEDIUM, HARD = load_task("balance_medium"), load_task("balance_hard")
 BOTH = pytest.mark.parametrize("task", [MEDIUM, HARD], ids=lambda task: task.name)
 ROD = UprightRod()
 NARROW = UprightRod(ridge=Ridge(width=0.008, height=0.05))
 LOPSIDED = UprightRod(rod=InlaidRod(com=0.0085))
+TIPPED = "the rod did not tip once let go"
+DROPPED = "the rod was not dropped"
+TOUCHED_AGAIN = "a rod that stood by itself was not touched again"
 stood = partial(on_ridge, UprightRod)
 
 
@@ -47,7 +52,7 @@ def test_the_rod_stays_up_if_its_centre_of_mass_is_over_the_ridge_and_is_lost_be
     scenario = stood(share * ridge.width / 2, ridge=ridge, rod=InlaidRod(com=com))
     world = left_alone(MEDIUM, scenario, 2.0)
     assert scenario.success(world) == balanced
-    assert balanced or scenario.failure(world) == "the rod was let go and tipped"
+    assert missed(scenario, world, TIPPED) == (not balanced)
 
 
 def test_a_ridge_is_as_wide_as_the_paper_says():
@@ -72,8 +77,14 @@ def test_nothing_is_hidden():
 # --- ways around ------------------------------------------------------------------------
 
 
+def under_the_rules_of_the_paper(plan, scenario=ROD):
+    return run(scenario, load(MEDIUM, scenario), plan, MEDIUM.horizon, until_settled=True, rules=PAPER)
+
+
 def test_a_foot_centred_on_the_ridge_does_not_serve_a_lopsided_rod_unless_the_lead_looks_along_the_ridge():
-    assert play_shortcut(MEDIUM, LOPSIDED, "by_the_middle_of_the_foot").reason == "the rod was let go and tipped"
+    world = load(MEDIUM, LOPSIDED)
+    assert play_shortcut(MEDIUM, LOPSIDED, "by_the_middle_of_the_foot", world).reason == AT_REST
+    assert missed(LOPSIDED, world, TIPPED)
     turned = UprightRod(rod=LOPSIDED.rod, rod_yaw=85.0)
     assert not turned.lopsided and play(MEDIUM, turned, turned._by_the_foot).solved
 
@@ -87,14 +98,14 @@ class Lenient(UprightRod):
 
 
 def test_held_it_is_upright_on_the_ridge_and_does_not_count():
-    assert play_shortcut(MEDIUM, Lenient(), "hold_it_there").solved
+    assert under_the_rules_of_the_paper(ROD._hold, Lenient()).solved
     assert not play_shortcut(MEDIUM, ROD, "hold_it_there").solved
 
 
-def test_a_rod_that_is_dropped_is_lost_though_it_may_stay_up():
-    free = unguarded(UprightRod)()
-    assert play(MEDIUM, free, lambda world: ROD._drop(world)).solved
-    assert play_shortcut(MEDIUM, ROD, "drop_it_from_above").reason == "the rod was dropped"
+def test_a_rod_that_is_dropped_does_not_count_though_it_may_stay_up():
+    assert under_the_rules_of_the_paper(ROD._drop).solved
+    ended = play_shortcut(MEDIUM, ROD, "drop_it_from_above")
+    assert ended.reason.startswith(OTHERWISE) and DROPPED in ended.reason
     assert MAX_FALL_SPEED**2 / (2 * 9.81) > 0.006
 
 
@@ -102,19 +113,23 @@ def again(world):
     """Open the jaw on the ridge, close it, and open it once more."""
     yield from ROD.lift(world)
     yield from ROD.bring(world, ROD.rod.com)
+    yield from ROD._set_down(world)
     yield from release(world.arm, 0.3)
     yield from grasp(world.arm)
     yield from ROD.leave(world)
 
 
 def test_a_rod_that_stood_on_the_ridge_may_not_be_touched_again():
-    assert play(MEDIUM, unguarded(UprightRod)(), again).solved
-    assert play(MEDIUM, ROD, again).reason == "the rod was touched again on the ridge"
+    assert under_the_rules_of_the_paper(again).solved
+    reason = play(MEDIUM, ROD, again).reason
+    assert reason.startswith(OTHERWISE) and TOUCHED_AGAIN in reason
     assert RELEASE_TIME < math.sqrt(2 * ROD.rod.height / (3 * 9.81)), "less than the time constant of its fall"
 
 
 def test_let_go_in_motion_it_falls():
-    assert play_shortcut(MEDIUM, ROD, "let_go_in_motion").reason == "the rod was let go and tipped"
+    world = load(MEDIUM, ROD)
+    assert play_shortcut(MEDIUM, ROD, "let_go_in_motion", world).reason == AT_REST
+    assert missed(ROD, world, TIPPED)
 
 
 def test_without_ridge_or_with_the_lead_on_the_other_side_the_witness_balances_nothing():

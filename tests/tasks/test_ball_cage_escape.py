@@ -1,4 +1,4 @@
-"""The ball leaves once the cage is lifted and tilted towards the hole; at the other end, or shaken out, it is lost."""
+"""The ball leaves once the cage is lifted and tilted towards the hole; over the other end, or shaken, it is no use."""
 
 import math
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     not_certified,
     play,
     play_shortcut,
     replayed,
     spared,
     unchecked,
-    unguarded,
 )
 
 from scengen import load_task
@@ -24,13 +24,18 @@ from scengen.assets.ball import Ball
 from scengen.assets.cage import SIDE, TOP, HoledCage, lowered
 from scengen.assets.prop import TABLE_TOP
 from scengen.assets.stool import Stool
-from scengen.episode import Episode
+from scengen.episode import OTHERWISE, Episode
+from scengen.sim.arm import ROBOT
 from scengen.skills.jaw import grasp
 from scengen.skills.motion import CLOSED, Pace, go_to, hold, until
 from scengen.tasks.ball_cage_escape import REST_SPEED, BallCageEscape
 
 TASK = load_task("ball_cage_escape")
 NOMINAL = BallCageEscape()
+LIFTED = "the jaw held the cage in the air as the ball left it"
+TILTED = "the cage was tilted to the hole, farther than the ball needs to roll"
+ONE_WAY = "the ball did not roll to the other end"
+UNTOUCHED = "no hand touched the ball in the cage"
 
 
 # --- what keeps the ball in -------------------------------------------------------------
@@ -57,14 +62,14 @@ def test_the_ball_stays_below_its_rolling_tilt_and_leaves_above_it(degrees, outc
 
 
 @pytest.mark.parametrize("name", ["tip_it_to_the_wrong_end", "tip_it_to_both_ends"])
-def test_a_tilt_to_the_wrong_end_loses_the_ball(name):
-    assert play_shortcut(TASK, NOMINAL, name).reason == "the ball rolled to the end without the hole"
+def test_a_tilt_to_the_wrong_end_leaves_the_ball_there_and_misses_a_mean(name):
+    world = load(TASK, NOMINAL)
+    assert play_shortcut(TASK, NOMINAL, name, world).outcome == "timeout" and not NOMINAL.out(world)
+    assert missed(NOMINAL, world, ONE_WAY)
 
 
-def test_only_a_rule_forbids_to_tilt_the_cage_both_ways():
-    wrong_first = tipped(NOMINAL, -20.0, 35.0)
-    outcomes = [play(TASK, scenario, wrong_first).solved for scenario in (NOMINAL, unguarded(BallCageEscape)())]
-    assert outcomes == [False, True]
+def test_a_cage_that_is_tilted_both_ways_reaches_the_goal_and_lacks_one_mean():
+    assert play(TASK, NOMINAL, tipped(NOMINAL, -20.0, 35.0)).reason == f"{OTHERWISE}: {ONE_WAY}"
 
 
 def half_tipped_and_thrown(world):
@@ -72,17 +77,14 @@ def half_tipped_and_thrown(world):
     yield from NOMINAL.shortcuts()["shake_it_half_tipped"].plan(world)
 
 
-def test_a_ball_that_is_shaken_out_is_lost_and_only_the_rule_forbids_it():
-    outcomes = []
-    for scenario in (NOMINAL, unguarded(BallCageEscape)()):
-        episode = Episode(scenario, world := load(TASK, scenario), TASK.horizon)
-        for action in half_tipped_and_thrown(world):
-            if episode.step(np.clip(action, -1.0, 1.0).astype(np.float32)):
-                break
-        while episode.outcome is None:
-            episode.step(world.idle.astype(np.float32))
-        outcomes.append(episode.reason or episode.outcome)
-    assert outcomes == ["the ball was shaken out of the cage", "success"]
+def test_a_ball_that_is_shaken_out_reaches_the_goal_and_lacks_the_tilt_alone():
+    episode = Episode(NOMINAL, world := load(TASK, NOMINAL), TASK.horizon)
+    for action in half_tipped_and_thrown(world):
+        if episode.step(np.clip(action, -1.0, 1.0).astype(np.float32)):
+            break
+    while episode.outcome is None:
+        episode.step(world.idle.astype(np.float32))
+    assert episode.reason == f"{OTHERWISE}: {TILTED}"
 
 
 def slid(world):
@@ -93,8 +95,8 @@ def slid(world):
     yield from NOMINAL.tip(world, lowered(0.6), rate=0.5)
 
 
-def test_a_ball_that_leaves_a_cage_on_its_stool_is_lost():
-    assert play(TASK, NOMINAL, slid).reason == "the ball left a cage that was not lifted"
+def test_a_ball_that_leaves_a_cage_on_its_stool_reaches_the_goal_and_lacks_the_lift():
+    assert play(TASK, NOMINAL, slid).reason == f"{OTHERWISE}: {LIFTED}"
 
 
 @pytest.mark.parametrize("rate", [0.25, 0.5, 1.0, 2.0])
@@ -120,7 +122,7 @@ def test_one_fixed_answer_is_right_in_half_of_the_draws():
     assert NOMINAL.answer().tries == 1
 
 
-@pytest.mark.parametrize(("heading", "outcome"), [(0.0, "success"), (180.0, "failure")])
+@pytest.mark.parametrize(("heading", "outcome"), [(0.0, "success"), (180.0, "timeout")])
 def test_a_guess_is_acted_upon(heading, outcome):
     answer = NOMINAL.answer()
     rollout = play(TASK, NOMINAL, lambda world: answer.act(world, heading))
@@ -192,7 +194,6 @@ def test_the_ball_is_out_when_all_of_it_is(beyond, is_out):
     [
         ("ball", [0.5, 0.0, 0.3], "the ball fell off the table"),
         ("cage", [0.5, 0.0, 0.3], "the cage fell off the table"),
-        ("ball", [-0.08 - 0.0465, 0.0, TABLE_TOP + 0.08 + 0.018], "the ball rolled to the end without the hole"),
     ],
 )
 def test_what_is_lost_is_lost_for_its_own_reason(body, place, reason):
@@ -200,6 +201,24 @@ def test_what_is_lost_is_lost_for_its_own_reason(body, place, reason):
     assert NOMINAL.failure(world) is None
     put(world, body, place)
     assert NOMINAL.failure(world) == reason
+
+
+@pytest.mark.parametrize(("along", "is_missed"), [(-0.0465, True), (-0.0430, False), (0.0, False)])
+def test_a_ball_at_the_end_without_the_hole_misses_a_mean(along, is_missed):
+    world = load(TASK, NOMINAL)
+    put(world, "ball", [-0.08 + along, 0.0, TABLE_TOP + 0.08 + 0.018])
+    assert missed(NOMINAL, world, ONE_WAY) == is_missed
+
+
+@pytest.mark.parametrize("touched", [True, False])
+def test_a_ball_that_a_hand_has_touched_misses_a_mean_as_it_leaves(touched):
+    world = load(TASK, NOMINAL)
+    robot, ball = (world.row(name) for name in (ROBOT, "ball"))
+    world.loop.touched[robot, ball] = touched
+    assert not missed(NOMINAL, world, UNTOUCHED), "it has not left yet"
+    world.data.joint("ball_free").qpos[:3] = world.pos("cage") + world.rot("cage") @ [NOMINAL.cage.offset, 0, 0]
+    mujoco.mj_forward(world.model, world.data)
+    assert missed(NOMINAL, world, UNTOUCHED) == touched
 
 
 # --- scenes that must not be certified ---------------------------------------------------
@@ -217,10 +236,13 @@ class Outside(BallCageEscape):
 
 @dataclass(frozen=True, kw_only=True)
 class Lifted(BallCageEscape):
-    """To have the cage off its stool is enough."""
+    """To have the cage off its stool is enough, by whatever means."""
 
     def success(self, world):
         return not world.touching("cage", "stool") and world.pos("cage")[2] > self.foot[2] + 0.02
+
+    def means(self):
+        return {}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,24 +10,24 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     parked,
     play_shortcut,
     solution,
     unchecked,
-    unguarded,
 )
 
 from scengen import load_task
 from scengen.assets.bowl import Bowl
+from scengen.episode import OTHERWISE
 from scengen.geometry import UP, about_y
-from scengen.params import values, with_values
 from scengen.robots.jaw import OPENING
 from scengen.tasks.bowl_table import FALL_ANGLE, MAX_FALL_SPEED, RIM_CLEARANCE, UPRIGHT_TOLERANCE, BowlTable
 from scengen.validate.rollout import replay
 
 TASK = load_task("bowl_table")
 NOMINAL = BowlTable()
-ACCIDENT = "the bowl lay on its side or upside down"
+NO_ACCIDENT = "the bowl neither fell nor touched anything askew"
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def test_what_counts_as_standing(world, change, counts):
 
 @pytest.mark.parametrize(("tilt", "lost"), [(FALL_ANGLE - 0.05, False), (FALL_ANGLE + 0.05, True), (math.pi, True)])
 def test_nothing_but_hands_touches_a_bowl_that_leans(world, tilt, lost):
-    assert (NOMINAL.failure(standing(world, tilt)) == ACCIDENT) == lost
+    assert missed(NOMINAL, standing(world, tilt), NO_ACCIDENT) == lost
 
 
 def test_the_bowl_in_its_rack_is_no_accident(world):
@@ -94,7 +94,7 @@ def test_the_bowl_in_its_rack_is_no_accident(world):
     for _ in range(20):
         world.step(world.idle)
     assert world.touching("bowl", "rack") and world.tilt("bowl") > math.pi - 0.01
-    assert NOMINAL.failure(world) is None and not NOMINAL.success(world)
+    assert not missed(NOMINAL, world, NO_ACCIDENT) and not NOMINAL.success(world)
 
 
 @pytest.mark.parametrize(("share", "breaks"), [(0.8, False), (1.7, True)])
@@ -104,7 +104,7 @@ def test_a_fall_breaks_the_bowl_from_the_height_of_a_textbook(world, share, brea
     broken = False
     for _ in range(30):
         world.step(world.idle)
-        broken = broken or NOMINAL.failure(world) == "the bowl was dropped"
+        broken = broken or missed(NOMINAL, world, NO_ACCIDENT)
     assert broken == breaks
 
 
@@ -161,11 +161,10 @@ def test_ablations_fail_at_what_they_take_away():
     assert lidded.touched("robot1", "bowl")
 
 
-def test_without_the_rule_an_accident_would_count():
-    free = with_values(unguarded(BowlTable)(), values(NOMINAL))
-    assert play_shortcut(TASK, free, "cup_tips_it_over").solved
+def test_an_accident_reaches_the_goal_and_lacks_means():
     end = play_shortcut(TASK, NOMINAL, "cup_tips_it_over")
-    assert end.outcome == "failure" and end.reason == ACCIDENT
+    assert end.reason.startswith(OTHERWISE) and NO_ACCIDENT in end.reason
+    assert "the jaw gripped the bowl while suction pulled" in end.reason
 
 
 # --- what must hold ---------------------------------------------------------------------------

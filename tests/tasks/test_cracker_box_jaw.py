@@ -10,16 +10,18 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     play,
     play_shortcut,
     replayed,
     solution,
     unchecked,
-    unguarded,
 )
 
 from scengen import load_task
+from scengen.episode import OTHERWISE
 from scengen.geometry import UP
+from scengen.means import Watch
 from scengen.params import values, with_values
 from scengen.robots.jaw import PALM_ABOVE, PALM_ALONG
 from scengen.tasks.cracker_box_jaw import GRIP_DEPTH, MAX_RELEASE_ANGLE, MIN_SLIDE_CLEARANCE, CrackerBoxJaw
@@ -27,6 +29,8 @@ from scengen.tasks.cracker_box_jaw import GRIP_DEPTH, MAX_RELEASE_ANGLE, MIN_SLI
 TASK = load_task("cracker_box_jaw")
 NOMINAL = CrackerBoxJaw()
 BOX = NOMINAL.box
+FLAT = "the box was let go at a flat angle"
+KNOCKED = "a knock of the robot brought the other end down"
 
 
 def elevation(world):
@@ -52,12 +56,12 @@ def test_a_shallow_slot_needs_no_knock():
             return replace(super().slot, depth=0.35 * self.box.size[0])
 
     shallow = with_values(unchecked(Shallow)(), values(NOMINAL))
-    assert play(TASK, shallow, shallow.shortcuts()["insert_and_leave"].plan).solved
+    assert play(TASK, shallow, shallow.shortcuts()["insert_and_leave"].plan).reason == f"{OTHERWISE}: {KNOCKED}"
 
 
 @pytest.mark.parametrize(("over", "steep"), [(0.01, True), (-0.01, False)])
 def test_a_box_may_be_let_go_in_the_slot_up_to_an_angle(over, steep):
-    """It leans on the near wall there, and slides down: the rule looks at it in the first period of contact."""
+    """It leans on the near wall there, and slides down: it is looked at in the first period of contact."""
     world = load(TASK, NOMINAL)
     middle, rot = NOMINAL.leaning(world, MAX_RELEASE_ANGLE + over)
     free = world.data.joint("box_free").qpos
@@ -66,15 +70,14 @@ def test_a_box_may_be_let_go_in_the_slot_up_to_an_angle(over, steep):
     while not world.touching("box", "slot"):
         world.step(world.idle)
     assert elevation(world) == pytest.approx(MAX_RELEASE_ANGLE + over, abs=0.008)
-    assert (NOMINAL.failure(world) == "the box was let go steeply in the slot") == steep
+    assert missed(NOMINAL, world, FLAT) == steep
 
 
-def test_without_the_rule_a_toppled_box_is_still_to_be_shoved():
-    """The shortcut alone reaches the goal neither way; it is the rule that ends the episode."""
-    free = unguarded(CrackerBoxJaw)()
-    topple = "stand_it_up_and_topple_it"
-    assert play_shortcut(TASK, free, topple).outcome == "timeout"
-    assert play_shortcut(TASK, NOMINAL, topple).reason == "the box was let go steeply in the slot"
+def test_a_toppled_box_is_not_in_its_seat_and_has_missed_a_mean():
+    """The shortcut does not reach the goal; were the box shoved on into its seat, this mean would lack."""
+    world = load(TASK, NOMINAL)
+    assert play_shortcut(TASK, NOMINAL, "stand_it_up_and_topple_it", world).outcome == "timeout"
+    assert FLAT in Watch(NOMINAL.means(), world).lacking()
 
 
 @pytest.mark.parametrize(("room", "passes"), [(0.0015, True), (-0.0015, False)])

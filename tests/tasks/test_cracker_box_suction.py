@@ -11,15 +11,14 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
-    play,
+    missed,
     play_shortcut,
     solution,
-    unguarded,
 )
 
 from scengen import load_task
+from scengen.episode import OTHERWISE
 from scengen.geometry import UP, about_z, axes
-from scengen.params import values, with_values
 from scengen.robots import suction
 from scengen.robots.suction import CUP_HALF_WIDTH, TORQUE
 from scengen.tasks.cracker_box import FLAT_TOLERANCE, HEIGHT_TOLERANCE
@@ -28,6 +27,7 @@ from scengen.tasks.cracker_box_suction import MAX_FALL_SPEED, SEAT_TOLERANCE, Cr
 TASK = load_task("cracker_box_suction")
 NOMINAL = CrackerBoxSuction()
 BOX = NOMINAL.box
+NO_FALL = "the box did not fall"
 
 
 def put(world, scenario, off=(0.0, 0.0, 0.0), lean=0.0, standing=False):
@@ -86,7 +86,7 @@ def test_a_fall_breaks_the_crackers_from_the_height_of_a_textbook(world, share, 
     put(world, NOMINAL, (0.0, 0.0, share * height))
     for _ in range(30):
         world.step(world.idle)
-        broken = broken or NOMINAL.failure(world) == "the box was dropped"
+        broken = broken or missed(NOMINAL, world, NO_FALL)
     assert broken == breaks
 
 
@@ -116,12 +116,12 @@ def test_a_cup_on_a_side_face_meets_the_slots_wall_while_the_box_has_a_centimetr
 # --- the means --------------------------------------------------------------------------------
 
 
-def test_without_the_rule_a_box_that_is_let_drop_lies_in_the_slot():
-    """The slot guides it: what a fall costs is all that is against it."""
-    careless = with_values(unguarded(CrackerBoxSuction)(), values(NOMINAL))
-    assert play(TASK, careless, NOMINAL.shortcuts()["let_it_drop"].plan).solved
+def test_a_box_that_is_let_drop_lies_in_the_slot_and_lacks_means():
+    """The slot guides it. It fell, and the cup that let go of it over the slot did not lay it down."""
     end = play_shortcut(TASK, NOMINAL, "let_it_drop")
-    assert end.outcome == "failure" and end.reason == "the box was dropped"
+    assert end.reason.startswith(OTHERWISE) and NO_FALL in end.reason
+    assert "the cup on a broad face laid the box down" in end.reason
+    assert "the cup still pulled when the box was down" in end.reason
 
 
 def test_a_box_taken_by_its_top_stands_in_the_slot():

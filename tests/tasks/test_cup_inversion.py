@@ -9,6 +9,7 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     parked,
     play_shortcut,
     solution,
@@ -16,13 +17,15 @@ from controls import (
 )
 
 from scengen import load_task
+from scengen.episode import OTHERWISE
 from scengen.physics import GRAVITY
 from scengen.tasks.cup_inversion import FALL_ANGLE, INVERTED_ANGLE, MAX_FALL_SPEED, UPRIGHT_TOLERANCE, CupInversion
-from scengen.validate.rollout import replay
+from scengen.validate.rollout import AT_REST, replay
 
 TASK = load_task("cup_inversion")
 NOMINAL = CupInversion()
 CUP = NOMINAL.cup
+NO_ACCIDENT = "the cup neither fell nor touched the table askew"
 
 
 def stood(world, tilt=0.0, off=(0.0, 0.0), up=0.0):
@@ -67,8 +70,8 @@ def test_what_counts_as_upright_on_the_square(world, change, counts):
 @pytest.mark.parametrize(
     ("tilt", "lost"), [(FALL_ANGLE - 0.1, False), (FALL_ANGLE + 0.1, True), (math.pi - 0.1, False)]
 )
-def test_a_cup_that_touches_the_table_askew_is_lost(world, tilt, lost):
-    assert (NOMINAL.failure(stood(world, tilt=tilt)) == "the cup was knocked over") == lost
+def test_a_cup_that_touches_the_table_askew_misses_a_mean(world, tilt, lost):
+    assert missed(NOMINAL, stood(world, tilt=tilt), NO_ACCIDENT) == lost
 
 
 @pytest.mark.parametrize(("share", "lost"), [(0.8, False), (1.6, True)])
@@ -78,8 +81,8 @@ def test_a_fall_costs_the_cup_from_the_height_of_a_textbook(world, share, lost):
     seen = set()
     for _ in range(30):
         world.step(world.idle)
-        seen.add(NOMINAL.failure(world))
-    assert ("the cup was dropped" in seen) == lost
+        seen.add(missed(NOMINAL, world, NO_ACCIDENT))
+    assert (True in seen) == lost
 
 
 def test_upside_down_the_cup_stands_still(world):
@@ -133,14 +136,17 @@ def test_from_a_state_in_the_middle_of_the_handover_the_witness_goes_on_bit_for_
 
 def test_a_push_topples_the_cup_if_its_rim_has_more_friction_than_its_radius_over_its_height():
     assert CUP.rim_friction < CUP.rim / CUP.height < 1.3
-    assert play_shortcut(TASK, NOMINAL, "topple_it").reason.startswith("everything came to rest")
-    assert play_shortcut(TASK, changed(rim_friction=1.3), "topple_it").reason == "the cup was knocked over"
+    for scenario, toppled in ((NOMINAL, False), (changed(rim_friction=1.3), True)):
+        world = load(TASK, scenario)
+        assert play_shortcut(TASK, scenario, "topple_it", world).reason == AT_REST
+        assert missed(scenario, world, NO_ACCIDENT) == toppled == (world.tilt("cup") < INVERTED_ANGLE)
 
 
 def test_two_hands_turn_a_cup_over_by_its_wall_if_that_has_more_friction_than_slope():
     assert CUP.friction < NOMINAL.slope < 0.4
     assert not play_shortcut(TASK, NOMINAL, "squeeze_and_roll").solved
-    assert play_shortcut(TASK, changed(friction=0.4), "squeeze_and_roll").solved
+    reason = play_shortcut(TASK, changed(friction=0.4), "squeeze_and_roll").reason
+    assert reason.startswith(OTHERWISE) and "suction alone lifted the inverted cup" in reason
 
 
 def test_every_constraint_refutes_what_violates_it():

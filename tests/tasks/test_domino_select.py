@@ -14,7 +14,6 @@ from controls import (
     not_certified,
     play_shortcut,
     replayed,
-    unguarded,
 )
 from helpers import other_under_mujoco_4, shift
 from hypothesis import given, settings
@@ -24,6 +23,7 @@ from scengen import load_task
 from scengen.assets.box import Domino
 from scengen.assets.chain import DECOY, DRIFT, GAP, MISSING, Defect
 from scengen.attack.priors import fit
+from scengen.episode import OTHERWISE
 from scengen.params import with_values
 from scengen.tasks.domino_select import LANES, RED_LANES, SLAB_DISPLACEMENT, DominoSelect
 from scengen.validate.rebuilt import rebuild
@@ -186,19 +186,20 @@ def test_the_orders_deal_three_different_defects_in_six_ways():
 # --- ways around the choice ---------------------------------------------------------------
 
 
+ALONE = "the robot touched the first tile of the intact chain alone"
+IN_PLACE, CASCADE = "that tile fell where it stood", "each tile of that chain struck the next"
 BYPASSES = {
-    "try_a_second_chain": "the robot touched a second chain",
-    "push_a_slab": "the robot touched a slab or a tile other than a first one",
-    "push_the_last_tile": "the robot touched a slab or a tile other than a first one",
-    "carry_the_first_tile_to_the_slab": "the robot carried the first tile away",
+    "try_a_second_chain": ALONE,
+    "push_a_slab": f"{ALONE}; {CASCADE}",
+    "push_the_last_tile": f"{ALONE}; {CASCADE}",
+    "carry_the_first_tile_to_the_slab": f"{IN_PLACE}; {CASCADE}",
 }
 
 
 @pytest.mark.parametrize("name", BYPASSES)
-def test_every_way_around_the_choice_would_work_and_is_forbidden(name):
+def test_every_way_around_the_choice_reaches_the_goal_and_lacks_means(name):
     ended = play_shortcut(TASK, DominoSelect(count=3), name)
-    assert (ended.outcome, ended.reason) == ("failure", BYPASSES[name])
-    assert play_shortcut(TASK, unguarded(DominoSelect)(count=3), name).solved
+    assert (ended.outcome, ended.reason) == ("failure", f"{OTHERWISE}: {BYPASSES[name]}")
 
 
 # --- scenes that must not be certified ---------------------------------------------------
@@ -239,11 +240,15 @@ class AllBroken(DominoSelect):
 
 
 NEGATIVES = {
-    "gap that is mended": (Mended(count=3), "shortcuts", "'topple_chain_0' reaches the goal"),
+    "gap that is mended": (
+        Mended(count=3),
+        "shortcuts",
+        f"'topple_chain_0' was not seen to its end (filtered): {OTHERWISE}",
+    ),
     "drift that slides across": (
         DominoSelect(second=Defect(kind=DRIFT, stretch=1.02)),
         "shortcuts",
-        "'topple_chain_1' reaches the goal",
+        f"'topple_chain_1' was not seen to its end (filtered): {OTHERWISE}",
     ),
     "rule that hides what works": (
         Hidden(count=3),

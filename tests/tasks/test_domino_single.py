@@ -1,4 +1,4 @@
-"""A chain falls alike whichever way it points, pushing behind it is a real bypass, and only rules close it."""
+"""A chain falls alike whichever way it points, pushing behind it is a real bypass, and lacks the means."""
 
 import mujoco
 import numpy as np
@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from scengen import load_task
 from scengen.assets.box import Domino
+from scengen.episode import OTHERWISE
 from scengen.tasks.domino_single import SLAB_DISPLACEMENT, DominoSingle
 from scengen.validate.rollout import AT_REST
 
@@ -84,24 +85,33 @@ def test_all_gaps_are_equal_and_a_stouter_starter_leaves_the_face_that_is_pushed
 # --- the bypass ---------------------------------------------------------------------------
 
 
+ALONE, IN_PLACE = "the robot touched the first tile alone", "the first tile fell where it stood"
+CASCADE = "each tile struck the next"
 BYPASSES = {
     "push_the_slab": "the robot touched the slab",
-    "push_the_last_tile": "the robot touched a tile other than the first",
-    "push_the_second_tile": "the robot touched a tile other than the first",
-    "carry_the_starter_to_the_slab": "the robot carried the first tile away",
-    "carry_the_starter_to_the_last_tile": "the robot carried the first tile away",
+    "push_the_last_tile": f"{OTHERWISE}: {ALONE}; {CASCADE}",
+    "push_the_second_tile": f"{OTHERWISE}: {ALONE}; {CASCADE}",
+    "carry_the_starter_to_the_slab": f"{OTHERWISE}: {IN_PLACE}; {CASCADE}",
+    "carry_the_starter_to_the_last_tile": f"{OTHERWISE}: {IN_PLACE}; {CASCADE}",
 }
 
 
 @pytest.mark.parametrize("name", BYPASSES)
-def test_every_way_around_the_chain_would_work_and_is_forbidden(name):
+def test_every_way_around_the_chain_reaches_the_goal_and_does_not_count(name):
     ended = play_shortcut(TASK, DominoSingle(), name)
     assert (ended.outcome, ended.reason) == ("failure", BYPASSES[name])
-    assert play_shortcut(TASK, unguarded(DominoSingle)(), name).solved
+    assert CASCADE in play_shortcut(TASK, unguarded(DominoSingle)(), name).lacks
 
 
-def test_without_rules_it_is_not_certified():
-    not_certified(TASK, unguarded(DominoSingle)(), "shortcuts", "reaches the goal")
+class Free(unguarded(DominoSingle)):
+    """Whoever moves the slab, by whatever means, has reached the goal."""
+
+    def means(self):
+        return {}
+
+
+def test_without_failures_and_means_it_is_not_certified():
+    not_certified(TASK, Free(), "shortcuts", "reaches the goal")
 
 
 def test_without_the_tiles_between_the_witness_moves_no_slab():

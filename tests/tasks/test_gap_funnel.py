@@ -9,23 +9,30 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     mistaken,
     not_certified,
     play_shortcut,
     replayed,
     solution,
-    unguarded,
 )
 
 from scengen import load_task
 from scengen.assets.ball import Ball
 from scengen.assets.gap_wall import GapWall, Kerb
 from scengen.attack.priors import fit
+from scengen.means import Watch
 from scengen.sim.arm import IDLE, ROBOT
 from scengen.tasks.gap_funnel import GapFunnel
+from scengen.validate.rollout import AT_REST
 
 TASK = load_task("gap_funnel")
 PLAIN = GapFunnel()
+BROUGHT = "the robot brought the ball before the gap"
+THROUGH = "the ball rolled through the gap by itself, on the table"
+LEFT_ALONE = "no hand touched the ball beyond the gap"
+ON_TABLE = "the ball stayed on the table"
+NOT_FELT = "neither ball nor hand felt for the gap along the wall"
 
 
 def rolled(scenario, speed, seconds):
@@ -62,38 +69,68 @@ def test_a_ball_that_is_too_fast_is_stopped_by_the_kerb_and_lies_in_the_zone():
 
 
 @pytest.mark.parametrize(
-    ("name", "reason"),
+    ("name", "lacks"),
     [
-        ("straight_ahead", "the ball struck the wall"),
-        ("straight_at_the_zone", "the ball struck the wall"),
-        ("too_slow", "everything came to rest without reaching the goal"),
-        ("over_the_wall", "the ball was lifted"),
+        ("straight_ahead", (BROUGHT, THROUGH, NOT_FELT)),
+        ("straight_at_the_zone", (BROUGHT, THROUGH, NOT_FELT)),
+        ("aslant_through_the_gap", (BROUGHT,)),
+        ("too_slow", ()),
+        ("over_the_wall", (BROUGHT, THROUGH, ON_TABLE)),
     ],
 )
-def test_shortcuts_end_as_they_should(name, reason):
-    assert play_shortcut(TASK, PLAIN, name).reason == reason
-
-
-@pytest.mark.parametrize(("beyond", "lost"), [(-0.001, False), (0.001, True)])
-def test_behind_the_middle_of_the_wall_the_robot_may_not_touch_the_ball(beyond, lost):
+def test_shortcuts_leave_the_ball_outside_the_zone_and_lack_what_they_leave_out(name, lacks):
     world = load(TASK, PLAIN)
+    ended = play_shortcut(TASK, PLAIN, name, world)
+    assert ended.outcome == "timeout" and not PLAIN.success(world)
+    assert ended.reason == AT_REST or name == "straight_ahead"
+    found = Watch(PLAIN.means(), world).lacking()
+    assert all(mean in found for mean in lacks) and bool(lacks) == bool(found)
+
+
+def put(world, beyond):
+    """Put the ball into the gap, `beyond` the middle of the wall [m]."""
     world.data.joint("ball_free").qpos[:3] = PLAIN.gap_at + beyond * PLAIN.normal + [0.0, 0.0, PLAIN.ball.radius]
     mujoco.mj_kinematics(world.model, world.data)
     mujoco.mj_comPos(world.model, world.data)
-    assert PLAIN.failure(world) is None
+
+
+def touch(world):
+    """Say that the robot touches the ball."""
     robot, ball = (world.row(name) for name in (ROBOT, "ball"))
     world.loop.touching[robot, ball] = True
-    assert PLAIN.failure(world) == ("the robot touched the ball behind the wall" if lost else None)
+
+
+@pytest.mark.parametrize(("beyond", "lost"), [(-0.001, False), (0.001, True)])
+def test_behind_the_middle_of_the_wall_the_ball_must_roll_by_itself(beyond, lost):
+    world = load(TASK, PLAIN)
+    put(world, beyond)
+    assert not missed(PLAIN, world, THROUGH)
+    touch(world)
+    assert missed(PLAIN, world, THROUGH) == lost
+
+
+@pytest.mark.parametrize("touched", [True, False])
+def test_a_hand_that_touches_the_ball_after_the_gap_misses_a_mean(touched):
+    world = load(TASK, PLAIN)
+    watch = Watch(PLAIN.means(), world)
+    put(world, 0.001)
+    watch.update()
+    if touched:
+        touch(world)
+    watch.update()
+    found = watch.lacking()
+    assert THROUGH not in found and (LEFT_ALONE in found) == touched
 
 
 def test_what_passes_the_gap_aslant_misses_the_zone_even_if_it_may_graze_the_wall():
     for offset in (0.08, -0.15):
-        assert not play_shortcut(TASK, unguarded(GapFunnel)(offset=offset), "aslant_through_the_gap").solved
+        assert play_shortcut(TASK, GapFunnel(offset=offset), "aslant_through_the_gap").reason == AT_REST
 
 
 def test_the_gap_is_what_the_ball_goes_through():
     (rollout, world), *_ = ablated(TASK, PLAIN).values()
-    assert rollout.reason == "the ball struck the wall" and world.touched("ball", "wall")
+    assert rollout.reason == AT_REST and world.touched("ball", "wall")
+    assert missed(PLAIN, world, NOT_FELT)
     solved = load(TASK, PLAIN)
     assert replayed(TASK, PLAIN, PLAIN, solved).solved and not solved.touched("ball", "wall")
 
@@ -118,7 +155,7 @@ def test_the_ball_comes_to_rest_out_of_reach():
 
 
 def test_an_oracle_that_does_not_bring_the_ball_before_the_gap_is_not_certified():
-    not_certified(TASK, mistaken(GapFunnel, "straight_ahead")(), "solved", "the ball struck the wall")
+    not_certified(TASK, mistaken(GapFunnel, "straight_ahead")(), "solved", "the oracle failed")
 
 
 def test_what_is_refuted_is_refuted_for_reasons_of_its_own():

@@ -10,6 +10,7 @@ from controls import (
     after_oracle,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     mistaken,
     not_certified,
     play_shortcut,
@@ -20,14 +21,20 @@ from controls import (
 from scengen import load_task
 from scengen.episode import Episode
 from scengen.geometry import UP
+from scengen.means import Watch
 from scengen.robots import ik
 from scengen.robots.jaw import TIP_BELOW
 from scengen.robots.panda import BASE
 from scengen.sim.arm import ROBOT
 from scengen.tasks.indirect_push import END_MARGIN, MAX_COAST_SPEED, MAX_PUSH_DISTANCE, ZONE_SIZE, IndirectPush, Spot
+from scengen.validate.rollout import AT_REST
 
 TASK = load_task("indirect_push")
 NOMINAL = IndirectPush()
+CHAIN = "a chain of two or more blocks passed the push on to the target"
+PUSHED = "the target moved only as far as the chain pushed it"
+NO_SINGLE_BLOCK = "no block touched robot and target at once"
+UNTOUCHED = "the robot did not touch the target"
 
 
 @pytest.fixture(scope="module")
@@ -62,26 +69,22 @@ def test_inverse_kinematics_finds_no_posture_in_which_one_block_would_do(beyond,
     assert (ik.reach(top).residual < 0.001) == reached
 
 
-class OneBlock(IndirectPush):
-    """The task without its rule on a single block between robot and target."""
-
-    def single_block(self, world):
-        return False
-
-
 def test_one_block_pushed_square_to_full_stretch_comes_too_short():
     w = load(TASK, NOMINAL)
-    assert not play_shortcut(TASK, OneBlock(), "push_one_block", w).solved
+    assert play_shortcut(TASK, NOMINAL, "push_one_block", w).reason == AT_REST
     assert NOMINAL.out(w.com("target")) < NOMINAL.distance + NOMINAL.way - ZONE_SIZE / 2 - 0.005
 
 
-def test_a_block_that_the_robot_touches_may_not_touch_the_target(solved):
+def test_a_block_that_touches_robot_and_target_at_once_misses_a_mean(solved):
     """Pushed corner first it reaches 0.41 edges farther than the bound, which is past the start of the zone."""
     entered = NOMINAL.distance + NOMINAL.way - ZONE_SIZE / 2
     assert NOMINAL.stretch + 1.5 * NOMINAL.edge < entered < NOMINAL.stretch + (2**0.5 + 0.5) * NOMINAL.edge
-    assert play_shortcut(TASK, NOMINAL, "push_one_block").reason == "a block that the robot touched touched the target"
+    w = load(TASK, NOMINAL)
+    play_shortcut(TASK, NOMINAL, "push_one_block", w)
+    assert Watch(NOMINAL.means(), w).lacking() == f"{CHAIN}; {NO_SINGLE_BLOCK}"
     first, second = NOMINAL.chosen
-    assert solved.touched(ROBOT, second) and solved.touched(first, "target") and not NOMINAL.single_block(solved)
+    assert solved.touched(ROBOT, second) and solved.touched(first, "target")
+    assert not missed(NOMINAL, solved, NO_SINGLE_BLOCK) and Watch(NOMINAL.means(), solved).lacking() == ""
 
 
 def test_a_blow_that_would_bring_the_target_into_the_zone_is_seen():
@@ -95,7 +98,7 @@ def test_a_blow_that_would_bring_the_target_into_the_zone_is_seen():
     for speed, struck in ((0.07, False), (0.09, True)):
         w.data.joint("target_free").qvel[:3] = speed * NOMINAL.u
         mujoco.mj_forward(w.model, w.data)
-        assert (NOMINAL.failure(w) == "the target was struck") == struck
+        assert missed(NOMINAL, w, PUSHED) == struck
 
 
 @pytest.mark.parametrize(("speed", "seen"), [(0.20, False), (0.25, False), (0.30, True), (0.60, True)])
@@ -108,9 +111,10 @@ def test_a_block_that_is_shot_at_the_target_loses_or_knocks_it_on_by_two_millime
     block.qvel[:3] = speed * NOMINAL.u
     mujoco.mj_forward(w.model, w.data)
     episode = Episode(NOMINAL, w)
-    seen_so = "failure" in [episode.step(w.filter(w.idle)) for _ in range(15)]
+    for _ in range(15):
+        assert episode.step(w.filter(w.idle)) is None
     assert w.touched("block_0", "target")
-    assert seen_so == seen == (episode.reason == "the target was struck")
+    assert (PUSHED in Watch(NOMINAL.means(), w).lacking()) == seen
     assert seen or (target.qpos - begin)[:3] @ NOMINAL.u < 0.0025
 
 
@@ -161,11 +165,11 @@ def test_it_must_be_on_the_table_and_at_rest(solved, what, index, value):
     solved.restore(state)
 
 
-def test_touching_the_target_or_dropping_it_from_the_table_loses(solved):
+def test_touching_the_target_misses_a_mean_and_dropping_it_from_the_table_loses(solved):
     state, touched = solved.state(), solved.loop.touched.copy()
-    assert NOMINAL.failure(solved) is None
+    assert NOMINAL.failure(solved) is None and not missed(NOMINAL, solved, UNTOUCHED)
     solved.loop.touched[-1, solved.body("target")] = solved.loop.touched[solved.body("target"), -1] = True
-    assert NOMINAL.failure(solved) == "the robot touched the target"
+    assert missed(NOMINAL, solved, UNTOUCHED)
     solved.loop.touched[:] = touched
     solved.data.joint("target_free").qpos[2] = 0.6
     mujoco.mj_kinematics(solved.model, solved.data)

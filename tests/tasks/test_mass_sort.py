@@ -8,6 +8,7 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     not_certified,
     play,
     play_shortcut,
@@ -26,9 +27,11 @@ from scengen.sim.arm import IDLE
 from scengen.skills import jaw
 from scengen.tasks.mass_sort import MIN_MASS_DIFFERENCE, ORDERS, PROBE_HEIGHT, MassSort, Spot
 from scengen.validate.rebuilt import world_of
+from scengen.validate.rollout import run
 
 TASK = load_task("mass_sort")
 SCENE = MassSort()
+WEIGHED = "each cube hung in the hand before one was put into a zone"
 
 
 def put_there(scenario, places, probed=True):
@@ -67,12 +70,11 @@ def test_two_cubes_in_their_zones_are_not_the_goal_and_lose_nothing():
     assert not SCENE.success(world) and SCENE.failure(world) is None
 
 
-def test_a_cube_in_its_zone_loses_the_episode_unless_each_has_been_lifted():
+def test_a_cube_in_its_zone_does_not_count_unless_each_has_been_lifted():
     """Negative control: the same cubes in the same places, with the last one lifted as well."""
     places = [SCENE.ranks[0], None, None]
-    told = "a cube was put into a zone before each had been lifted"
-    assert SCENE.failure(put_there(SCENE, places, probed=False)) == told
-    assert SCENE.failure(put_there(SCENE, places)) is None
+    assert missed(SCENE, put_there(SCENE, places, probed=False), WEIGHED)
+    assert not missed(SCENE, put_there(SCENE, places), WEIGHED)
 
 
 def test_lifted_is_a_centimetre_up_in_the_hand():
@@ -142,7 +144,7 @@ def test_one_fixed_answer_is_right_in_a_quarter_of_training_and_not_more():
 # --- ways around ----------------------------------------------------------------------------
 
 
-def test_without_the_rule_one_could_try_order_after_order():
+def test_if_a_wrong_zone_were_not_the_end_one_could_try_order_after_order():
     patient = unguarded(MassSort)()
 
     def try_all(world):
@@ -150,7 +152,8 @@ def test_without_the_rule_one_could_try_order_after_order():
         yield from patient.deliver(world, {"cube_0": patient.ranks[0], "cube_1": patient.ranks[1]})
         yield from patient.deliver(world, {"cube_2": patient.ranks[2]})
 
-    assert patient.ranks[0] != 0 and play(TASK, patient, try_all).solved
+    ended = run(patient, load(TASK, patient), try_all, TASK.horizon, rules="paper")
+    assert patient.ranks[0] != 0 and ended.solved and WEIGHED in ended.lacks
     assert play(TASK, SCENE, try_all).reason == "a cube was put into a wrong zone"
 
 

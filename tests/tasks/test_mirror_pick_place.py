@@ -231,10 +231,13 @@ class Believes(MirrorPickPlace):
 
 @dataclass(frozen=True, kw_only=True)
 class Touched(MirrorPickPlace):
-    """To be near the place that the picture shows is enough."""
+    """To be near the place that the picture shows is enough, by any means."""
 
     def success(self, world):
         return math.dist(world.arm.hand, self.orientation.seen_at(self.spot)) < 0.05
+
+    def means(self):
+        return {}
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Lids hide the cubes from every camera, come off without taking the cubes along, and a wrong cube is the end."""
+"""Lids hide the cubes from every camera, come off without taking the cubes along, and one wrong cube is too many."""
 
 import math
 from dataclasses import dataclass, replace
@@ -10,6 +10,7 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     not_certified,
     play,
     play_shortcut,
@@ -24,10 +25,12 @@ from scengen.geometry import UP
 from scengen.params import parameters
 from scengen.sim.arm import IDLE, ROBOT
 from scengen.tasks.occluder_push import CUBE_COUNT, OTHER_COLOURS, RED, OccluderPush, Spot
+from scengen.validate.rollout import run
 
 TASK = load_task("occluder_push")
 SCENE = OccluderPush(red=0)
-WRONG = "another cube was put on the patch"
+CLEAN = "no other cube came onto the patch"
+AT_REST = "everything came to rest without reaching the goal"
 
 
 def seen(world, scenario, camera):
@@ -117,7 +120,7 @@ def test_a_shove_takes_the_cube_along():
 @pytest.mark.parametrize("name", ["reach_through_the_lid", "pick_the_lid_up"])
 def test_who_leaves_the_lid_on_never_touches_the_cube(name):
     w = load(TASK, SCENE)
-    assert play_shortcut(TASK, SCENE, name, w).reason == "everything came to rest without reaching the goal"
+    assert play_shortcut(TASK, SCENE, name, w).reason == AT_REST
     assert not w.touched(ROBOT, "cube_0")
 
 
@@ -128,15 +131,30 @@ def test_the_oracle_is_told_nothing():
 
 
 def test_the_witness_knows_where_the_red_cube_is_and_is_lost_where_it_is_elsewhere():
-    ((ended, _),) = ablated(TASK, SCENE).values()
-    assert ended.reason == WRONG
+    ((ended, w),) = ablated(TASK, SCENE).values()
+    assert ended.reason == AT_REST and missed(SCENE, w, CLEAN)
 
 
 def test_one_fixed_answer_is_right_in_a_third_of_training_and_not_more():
     training, fresh = ([TASK.draw("id", seed, i).scenario for i in range(150)] for seed in (1, 2))
     (prior,) = fit(training, fresh=fresh)
     assert 0.25 <= prior.fresh <= 0.38
-    assert play_shortcut(TASK, SCENE, "take_another").reason == WRONG
+    w = load(TASK, SCENE)
+    assert play_shortcut(TASK, SCENE, "take_another", w).reason == AT_REST and missed(SCENE, w, CLEAN)
+
+
+def test_another_cube_on_the_patch_takes_the_second_try_away():
+    """There is room for both."""
+
+    def try_two(world):
+        for i, aside in ((1, 0.03), (0, -0.03)):
+            yield from SCENE.uncover(world, i)
+            yield from replace(SCENE, patch_x=SCENE.patch_x + aside).deliver(world, i)
+
+    free = run(SCENE, load(TASK, SCENE), try_two, TASK.horizon, rules="paper")
+    assert free.solved and CLEAN in free.lacks
+    ended = play(TASK, SCENE, try_two)
+    assert ended.outcome == "failure" and CLEAN in ended.reason
 
 
 @pytest.mark.parametrize("split", ["wide_lids", "patch_beyond"])
@@ -148,11 +166,11 @@ def test_a_memorised_motion_serves_no_other_lids_and_no_other_patch(split):
 # --- goal and failure -----------------------------------------------------------------------
 
 
-def test_the_red_cube_on_the_patch_is_the_goal_and_another_one_is_the_end():
+def test_the_red_cube_on_the_patch_is_the_goal_and_another_one_must_not_come_there():
     for red in range(CUBE_COUNT):
         w = ready(replace(SCENE, red=red), cube_0=SCENE.goal)
         assert SCENE.success(w) == (red == 0)
-        assert SCENE.failure(w) == (None if red == 0 else WRONG)
+        assert missed(SCENE, w, CLEAN) == (red != 0)
 
 
 @pytest.mark.parametrize(("short", "counts"), [(0.001, True), (-0.001, False)])

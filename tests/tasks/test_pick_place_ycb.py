@@ -204,12 +204,15 @@ def test_a_lift_is_three_centimetres(height, counts):
 
 @dataclass(frozen=True, kw_only=True)
 class Forgiving(PickPlaceYcb):
-    """Where the square was at the start will do."""
+    """Where the square was at the start will do, by any means."""
 
     def success(self, world):
         return bool(
             np.abs(world.com("thing") - self.spots[0])[:2].max() < self.patch.size / 2 and not world.arm.grip > 0
         )
+
+    def means(self):
+        return {}
 
 
 @pytest.mark.parametrize(

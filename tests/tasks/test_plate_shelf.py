@@ -10,11 +10,11 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     parked,
     play_shortcut,
     solution,
     unchecked,
-    unguarded,
 )
 
 from scengen import load_task
@@ -29,10 +29,17 @@ from scengen.tasks.plate_and_slot import (
     PlateAndSlot,
 )
 from scengen.tasks.plate_shelf import PlateShelf
-from scengen.validate.rollout import replay
+from scengen.validate.rollout import replay, run
 
 TASK = load_task("plate_shelf_hetbi")
 NOMINAL = PlateShelf()
+JAW_LOWERS, FALL = "a jaw alone lowered the plate in the slot", "the plate did not fall"
+AT_EDGE = "the plate stayed away from the table's edge"
+
+
+def anyhow(scenario, name):
+    """Play a shortcut under the rules of the paper: the goal counts however it is reached."""
+    return run(scenario, load(TASK, scenario), scenario.shortcuts()[name].plan, TASK.horizon, rules="paper")
 
 
 def standing(world, scenario, along=0.0, up=0.0, lean=0.0, yaw=0.0):
@@ -95,7 +102,7 @@ def test_a_fall_breaks_the_plate_from_the_height_of_a_textbook(world, share, bre
     standing(world, NOMINAL, up=share * height)
     for _ in range(30):
         world.step(world.idle)
-        broken = broken or NOMINAL.failure(world) == "the plate was dropped"
+        broken = broken or missed(NOMINAL, world, FALL)
     assert broken == breaks
 
 
@@ -126,9 +133,10 @@ def test_a_cup_on_the_lip_does_alone_between_low_dividers_what_it_cannot_between
     # The cup on the lip slips off the glaze as it turns. Between low dividers 34 mm apart the plate leans too far.
     rough = {**values(scenario), "plate.friction": 0.6, "gap": 0.032}
     low, high = (with_values(unchecked(PlateShelf)(), {**rough, "proud": proud}) for proud in (0.065, 0.0))
-    assert play_shortcut(TASK, low, "cup_on_the_lip").solved
+    alone = anyhow(low, "cup_on_the_lip")
+    assert alone.solved and JAW_LOWERS in alone.lacks and FALL not in alone.lacks
     end = play_shortcut(TASK, high, "cup_on_the_lip")
-    assert end.outcome == "failure" and end.reason == "the plate was dropped"
+    assert end.outcome == "failure" and FALL in end.reason
 
 
 # --- one hand alone -------------------------------------------------------------------------
@@ -137,8 +145,9 @@ def test_a_cup_on_the_lip_does_alone_between_low_dividers_what_it_cannot_between
 def test_at_an_open_end_the_cup_alone_stands_the_plate_in_the_slot():
     """What the walls at the ends are for."""
     scenario = TASK.draw("id", 0, 2).scenario
-    assert play_shortcut(TASK, open_ended(scenario), "cup_at_an_end").solved
-    assert play_shortcut(TASK, scenario, "cup_at_an_end").reason == "the plate was dropped"
+    alone = anyhow(open_ended(scenario), "cup_at_an_end")
+    assert alone.solved and JAW_LOWERS in alone.lacks
+    assert not anyhow(scenario, "cup_at_an_end").solved
 
 
 def test_one_jaw_takes_a_rough_plate_with_a_high_lip_and_no_other():
@@ -147,17 +156,18 @@ def test_one_jaw_takes_a_rough_plate_with_a_high_lip_and_no_other():
     rough = {**values(scenario), "plate.friction": 0.6, "plate.rise": 0.020, "gap": 0.046}
     held = with_values(unchecked(PlateShelf)(), rough)
     assert held.flat_tilt < 2 * math.atan(0.6) and scenario.flat_tilt > 2 * math.atan(scenario.plate.friction)
-    assert play_shortcut(TASK, held, "jaw_takes_it_flat").solved
+    alone = anyhow(held, "jaw_takes_it_flat")
+    assert alone.solved and "suction alone lifted the plate" in alone.lacks
     world = load(TASK, scenario)
     assert not play_shortcut(TASK, scenario, "jaw_takes_it_flat", world).solved
     assert world.touched("robot1", "plate") and world.touching("plate", "table")
 
 
-def test_beside_the_table_the_jaw_finds_room_but_for_the_rule():
-    free = with_values(unguarded(PlateShelf)(), values(NOMINAL))
-    assert play_shortcut(TASK, free, "jaw_slides_it_to_the_edge").solved
+def test_beside_the_table_the_jaw_finds_room_where_the_plate_must_not_go():
+    alone = anyhow(NOMINAL, "jaw_slides_it_to_the_edge")
+    assert alone.solved and AT_EDGE in alone.lacks
     end = play_shortcut(TASK, NOMINAL, "jaw_slides_it_to_the_edge")
-    assert end.reason == "the plate was pushed to the table's edge"
+    assert end.outcome == "failure" and AT_EDGE in end.reason
 
 
 # --- what must hold -------------------------------------------------------------------------

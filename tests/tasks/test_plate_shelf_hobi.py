@@ -12,10 +12,10 @@ from controls import (
     each_refuted_for_its_own_reason,
     load,
     parked,
+    play,
     play_shortcut,
     solution,
     unchecked,
-    unguarded,
 )
 from helpers import other_under_mujoco_4
 
@@ -23,14 +23,23 @@ from scengen import load_task
 from scengen.assets.prop import TABLE_TOP
 from scengen.errors import GaveUp
 from scengen.geometry import rotation
+from scengen.means import MISSED
 from scengen.params import values, with_values
 from scengen.robots.jaw import PALM_ABOVE, PALM_ALONG
 from scengen.sim.world import World
 from scengen.tasks.plate_shelf_hobi import OVERLAP, PALM_CLEARANCE, PlateShelfHobi
+from scengen.validate.rollout import run
 
 TASK = load_task("plate_shelf_hobi")
 NOMINAL = PlateShelfHobi()
 PLATE = NOMINAL.plate
+AT_EDGE, FALL = "the plate stayed away from the table's edge", "the plate did not fall"
+UNPRESSED, KNOCKED = "no hand raised the plate unpressed", "the plate touched the shelf on edge only"
+
+
+def has_missed(world, mean):
+    """Whether the episode that was played in a world missed a mean."""
+    return world.shown[list(NOMINAL.means()).index(mean)] == MISSED
 
 
 def until_taken(scenario):
@@ -97,33 +106,32 @@ def test_one_jaw_lifts_the_flat_plate_by_its_rim_where_it_is_rough(friction, lif
     assert (highest > 0.05) == lifts
 
 
-def test_beside_the_table_one_arm_finds_room_but_for_the_rule():
-    free = with_values(unguarded(PlateShelfHobi)(), values(NOMINAL))
-    assert play_shortcut(TASK, free, "slide_it_to_the_edge").solved
+def test_beside_the_table_one_arm_finds_room_where_the_plate_must_not_go():
+    slide = NOMINAL.shortcuts()["slide_it_to_the_edge"].plan
+    free = run(NOMINAL, load(TASK, NOMINAL), slide, TASK.horizon, rules="paper")
+    assert free.solved and AT_EDGE in free.lacks
     end = play_shortcut(TASK, NOMINAL, "slide_it_to_the_edge")
-    assert end.reason == "the plate was pushed to the table's edge"
+    assert end.outcome == "failure" and AT_EDGE in end.reason
 
 
-def test_a_plate_that_falls_back_breaks():
-    end = play_shortcut(TASK, NOMINAL, "let_it_fall_back")
-    assert end.reason == "the plate was dropped" and end.seconds < 5.0
+def test_a_plate_that_falls_back_has_fallen():
+    world = load(TASK, NOMINAL)
+    assert not play_shortcut(TASK, NOMINAL, "let_it_fall_back", world).solved
+    assert has_missed(world, FALL)
 
 
 def test_two_hands_lift_the_plate_between_them_but_get_no_farther():
-    """Without the rule on raising they come as far as the shelf."""
+    """They come as far as the shelf."""
+    world, heights = load(TASK, NOMINAL), []
 
-    class MayRaise(PlateShelfHobi):
-        def raised_unpressed(self, world):
-            return False
+    def squeeze(world):
+        for action in NOMINAL.shortcuts()["squeeze_it_between_the_hands"].plan(world):
+            if world.touching("robot0", "plate") and world.touching("robot1", "plate"):
+                heights.append(world.pos("plate")[2] - TABLE_TOP)
+            yield action
 
-    free = with_values(MayRaise(), values(NOMINAL))
-    world = load(TASK, free)
-    end = play_shortcut(TASK, free, "squeeze_it_between_the_hands", world)
-    assert end.reason == "the plate knocked against the shelf"
-    assert world.pos("plate")[2] - TABLE_TOP > 0.1
-    assert world.touching("robot0", "plate") and world.touching("robot1", "plate")
-    end = play_shortcut(TASK, NOMINAL, "squeeze_it_between_the_hands")
-    assert end.reason == "the plate was raised without being pressed"
+    assert not play(TASK, NOMINAL, squeeze, world).solved
+    assert max(heights) > 0.1 and has_missed(world, UNPRESSED) and has_missed(world, KNOCKED)
 
 
 @pytest.mark.parametrize(

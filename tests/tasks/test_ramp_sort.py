@@ -9,6 +9,7 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     mistaken,
     not_certified,
     play_shortcut,
@@ -27,6 +28,7 @@ from scengen.tasks.ramp_sort import BARRIER_START, BIN_FLOOR, RampSort
 TASK = load_task("ramp_sort")
 NOMINAL = RampSort(reds=1, blues=1)
 """The smallest sorting there is, which takes half as long."""
+BY_ITSELF = "each ball came over the lower half of the ramp by itself"
 
 
 def put(world, i, along, across, scenario, height=0.0):
@@ -46,10 +48,7 @@ def test_the_smallest_scene_is_solved_and_every_ball_used_the_ramp():
 
 def test_without_the_ramp_or_with_the_bins_exchanged_the_same_motion_fails():
     ends = ablated(TASK, NOMINAL)
-    assert ends["no_ramp"][0].reason in (
-        "a ball is on the table or on the floor",
-        "a ball came into its bin without the ramp",
-    )
+    assert ends["no_ramp"][0].reason == "a ball is on the table or on the floor"
     assert ends["bins_exchanged"][0].reason == "a ball is in the bin of the other colour"
 
 
@@ -57,12 +56,12 @@ def test_without_the_ramp_or_with_the_bins_exchanged_the_same_motion_fails():
     ("name", "reason"),
     [
         ("colours_exchanged", "a ball is in the bin of the other colour"),
-        ("through_the_barrier", "a ball was carried over the ramp or the bins"),
+        ("through_the_barrier", BY_ITSELF),
     ],
 )
-def test_one_wrong_ball_ends_the_episode(name, reason):
+def test_a_wrong_ball_ends_the_episode_and_balls_that_are_carried_do_not_count(name, reason):
     rollout = play_shortcut(TASK, NOMINAL, name)
-    assert rollout.outcome == "failure" and rollout.reason == reason
+    assert rollout.outcome == "failure" and reason in rollout.reason
 
 
 def test_the_barrier_stops_the_hand():
@@ -102,7 +101,7 @@ def test_every_ball_must_be_in_its_bin(red_at, blue_at, success):
     assert NOMINAL.success(w) == success
 
 
-def test_failures_name_what_went_wrong():
+def test_failures_and_means_name_what_went_wrong():
     w = load(TASK, NOMINAL)
     assert NOMINAL.failure(w) is None
     state = w.state()
@@ -110,9 +109,9 @@ def test_failures_name_what_went_wrong():
     assert NOMINAL.failure(w) == "a ball is in the bin of the other colour"
     w.restore(state)
     put(w, 0, NOMINAL._bins_along, -0.05, NOMINAL)
-    assert NOMINAL.failure(w) == "a ball came into its bin without the ramp"
+    assert NOMINAL.failure(w) is None and missed(NOMINAL, w, BY_ITSELF)
     w.loop.touched[w.body("ball_0"), w.body("ramp")] = w.loop.touched[w.body("ramp"), w.body("ball_0")] = True
-    assert NOMINAL.failure(w) is None
+    assert NOMINAL.failure(w) is None and not missed(NOMINAL, w, BY_ITSELF)
     w.restore(state)
     put(w, 1, 0.0, 0.0, NOMINAL, height=-0.1)
     assert NOMINAL.failure(w) == "a ball is on the table or on the floor"
@@ -124,7 +123,7 @@ def test_past_the_start_of_the_barrier_a_ball_stays_low(height, high):
     for along, beyond in ((BARRIER_START + 0.01, high), (BARRIER_START - 0.01, False)):
         surface = NOMINAL.ramp.surface(along, 0.06)[2]
         put(w, 0, along, 0.06, NOMINAL, height=surface + height - BIN_FLOOR - NOMINAL.ball.radius)
-        assert NOMINAL.high_over_ramp(w, 0) == beyond
+        assert NOMINAL.high_over_ramp(w, 0) == beyond == missed(NOMINAL, w, BY_ITSELF)
 
 
 # --- scenes that must not be certified ---------------------------------------------------
@@ -142,6 +141,9 @@ class Colourless(RampSort):
 
     def failure(self, world):
         return None
+
+    def means(self):
+        return {}
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,12 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     not_certified,
     play,
     play_shortcut,
     replayed,
     unchecked,
-    unguarded,
 )
 from rods import left_alone, on_ridge
 
@@ -28,9 +28,11 @@ from scengen.params import parameters
 from scengen.sim import scene_text
 from scengen.sim.world import World
 from scengen.tasks.rod_across import MAX_TILT, RodAcross
+from scengen.validate.rollout import run
 
 TASK = load_task("rod_across")
 ROD = RodAcross()
+TIPPED = "the rod did not tip once let go"
 laid = partial(on_ridge, RodAcross)
 
 
@@ -38,12 +40,12 @@ laid = partial(on_ridge, RodAcross)
 
 
 @pytest.mark.parametrize(("share", "balanced"), [(0.0, True), (-0.9, True), (0.9, True), (-1.1, False), (1.1, False)])
-def test_the_goal_holds_if_the_centre_of_mass_is_over_the_ridge_and_beyond_its_edge_the_rod_is_lost(share, balanced):
+def test_the_goal_holds_if_the_centre_of_mass_is_over_the_ridge_and_beyond_its_edge_the_rod_tips(share, balanced):
     ridge = TASK.draw("id", 0, 0).scenario.ridge
     scenario = laid(share * ridge.width / 2, ridge=ridge)
     world = left_alone(TASK, scenario, 1.5)
     assert scenario.success(world) == balanced
-    assert balanced or scenario.failure(world) == "the rod was let go and tipped"
+    assert missed(scenario, world, TIPPED) != balanced
 
 
 @pytest.mark.parametrize(("turned", "counts"), [(25.0, True), (35.0, False), (90.0, False)])
@@ -106,18 +108,20 @@ def test_no_fixed_place_along_the_rod_balances_more_than_a_tenth_of_training():
 # --- ways around ------------------------------------------------------------------------
 
 
-def test_a_rod_that_tipped_could_be_picked_up_again_and_therefore_it_is_lost():
-    """Repeated attempts would succeed: only the rule makes a failed attempt end the episode."""
+def test_a_rod_that_tipped_can_be_picked_up_again_and_therefore_it_must_not_tip():
+    """Repeated attempts reach the goal, but not by one try."""
     scenario = replace(ROD, rod=Rod(com=0.05))
-    assert play_shortcut(TASK, scenario, "by_the_middle").reason == "the rod was let go and tipped"
-    patient = unguarded(RodAcross)(rod=scenario.rod)
+    world = load(TASK, scenario)
+    assert not play_shortcut(TASK, scenario, "by_the_middle", world).solved and missed(scenario, world, TIPPED)
 
     def again(world):
-        yield from patient._lay(world, 0.0)
-        yield from patient._lay(world, patient.rod.com)
+        yield from scenario._lay(world, 0.0)
+        yield from scenario._lay(world, scenario.rod.com)
 
-    assert play(TASK, patient, again).solved
-    assert not play(TASK, scenario, again).solved
+    free = run(scenario, world, again, TASK.horizon, rules="paper")
+    assert free.solved and TIPPED in free.lacks
+    ended = play(TASK, scenario, again)
+    assert ended.outcome == "failure" and TIPPED in ended.reason
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,6 +130,9 @@ class Lenient(RodAcross):
 
     def success(self, world):
         return world.tilt("rod") <= MAX_TILT and world.touching("rod", "stand/ridge")
+
+    def means(self):
+        return {}
 
 
 @pytest.mark.parametrize("name", ["hold_it_there", "along_the_ridge"])
@@ -136,14 +143,15 @@ def test_held_or_laid_along_the_ridge_it_is_level_and_does_not_count(name):
 
 def test_the_torque_alone_misleads_where_the_rod_is_not_a_common_one():
     scenario = replace(ROD, rod=Rod(com=0.085, mass=0.10))
-    assert play_shortcut(TASK, scenario, "by_the_torque_alone").reason == "the rod was let go and tipped"
+    world = load(TASK, scenario)
+    assert not play_shortcut(TASK, scenario, "by_the_torque_alone", world).solved and missed(scenario, world, TIPPED)
     assert "by_the_torque_alone" not in replace(ROD, rod=Rod(com=0.085, mass=0.125)).shortcuts()
 
 
 def test_without_ridge_or_with_the_slug_elsewhere_the_witness_balances_nothing():
     ends = ablated(TASK, ROD)
     assert set(ends) == {"no_ridge", "slug_elsewhere"} and not any(end.solved for end, _ in ends.values())
-    assert ends["slug_elsewhere"][0].reason == "the rod was let go and tipped"
+    assert missed(ROD, ends["slug_elsewhere"][1], TIPPED)
 
 
 @pytest.mark.parametrize("split", ["turned", "high_ridge"])

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from controls import ablated, load, not_certified, play, play_shortcut, refuted, replayed, unchecked, unguarded
+from controls import ablated, load, missed, not_certified, play, play_shortcut, refuted, replayed, unchecked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,14 +14,16 @@ from scengen.assets.box import Block
 from scengen.assets.prop import place, table
 from scengen.assets.seesaw import Seesaw
 from scengen.attack.priors import fit
-from scengen.params import parameters, with_values
+from scengen.params import parameters
 from scengen.sim.arm import IDLE
 from scengen.sim.world import World
 from scengen.tasks.seesaw_balance import BEAM, MAX_TILT, TARGET_TOLERANCE, SeesawBalance
 from scengen.validate.rebuilt import rebuild
+from scengen.validate.rollout import run
 
 TASK = load_task("seesaw_balance")
 SPLITS = ["id", *TASK.axes]
+STAYED = "the target stayed where it stood, untouched"
 LIGHT, HEAVY = SeesawBalance(weight=Block(mass=0.14)), SeesawBalance(weight=Block(mass=0.35))
 
 
@@ -190,6 +192,9 @@ class Lenient(SeesawBalance):
     def success(self, world):
         return world.tilt(BEAM) <= MAX_TILT
 
+    def means(self):
+        return {}
+
 
 LENIENT = Lenient(weight=HEAVY.weight)
 
@@ -218,17 +223,18 @@ def test_without_the_counterweight_the_witness_levels_nothing():
     assert not replayed(TASK, HEAVY, LENIENT, load(TASK, HEAVY, *HEAVY.ablations().values())).solved
 
 
-def test_dropping_the_target_loses():
-    assert SeesawBalance().failure(settled(SeesawBalance(), -0.1, 0.33)) == "the target fell on the table"
+def test_a_target_that_falls_on_the_table_did_not_stay():
+    assert missed(SeesawBalance(), settled(SeesawBalance(), -0.1, 0.33), STAYED)
 
 
 @pytest.mark.parametrize("index", range(2))
-def test_moving_the_target_would_level_what_a_guess_has_missed_and_loses(index):
+def test_moving_the_target_levels_what_a_guess_has_missed_but_it_must_stay(index):
     scenario = TASK.draw("id", 0, index).scenario
-    open_to_it = with_values(unguarded(SeesawBalance)(), {p.name: p.nominal for p in parameters(scenario)})
-    assert play_shortcut(TASK, open_to_it, "shift_the_target").solved
+    shift = scenario.shortcuts()["shift_the_target"].plan
+    free = run(scenario, load(TASK, scenario), shift, TASK.horizon, rules="paper")
+    assert free.solved and STAYED in free.lacks
     ended = play_shortcut(TASK, scenario, "shift_the_target")
-    assert (ended.outcome, ended.reason) == ("failure", "the target was touched")
+    assert ended.outcome == "failure" and STAYED in ended.reason
 
 
 # --- scenes that must not be certified --------------------------------------------------

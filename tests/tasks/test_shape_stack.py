@@ -7,18 +7,19 @@ import pytest
 from controls import (
     each_refuted_for_its_own_reason,
     load,
+    missed,
     mistaken,
     not_certified,
     play,
     play_shortcut,
     replayed,
-    unguarded,
 )
 
 from scengen import load_task
 from scengen.assets.shape import FRUSTUM, KINDS, Shape
 from scengen.attack.priors import fit
 from scengen.geometry import UP, heading
+from scengen.means import MISSED
 from scengen.sim.arm import IDLE
 from scengen.tasks.shape_stack import FALL_ANGLE, Place, ShapeStack
 
@@ -26,6 +27,7 @@ TASK = load_task("shape_stack")
 THREE = ShapeStack(count=3)
 NAMES = tuple(THREE.pieces)
 Y = heading(90.0)
+NOT_ON_CONE = "nothing was set on the cone"
 
 
 def put_up(scenario, spots, seconds=2.0):
@@ -94,18 +96,23 @@ def test_training_has_three_to_five_of_the_five_shapes_each_at_most_once():
 # --- ways around ----------------------------------------------------------------------------
 
 
-def test_what_is_put_on_the_cone_is_lost_and_would_not_stand_without_the_rules_either():
-    assert play_shortcut(TASK, THREE, "cone_at_the_bottom").reason == "a shape was set on the cone"
-    world = load(TASK, free := unguarded(ShapeStack)(count=3))
-    assert not play_shortcut(TASK, free, "cone_at_the_bottom", world).solved
-    assert any(world.tilt(name) > FALL_ANGLE for name in NAMES)
+def has_missed(scenario, world, mean):
+    """Whether the episode that was played in a world missed a mean."""
+    return world.shown[list(scenario.means()).index(mean)] == MISSED
+
+
+def test_what_is_put_on_the_cone_does_not_stand_and_was_set_on_the_cone():
+    world = load(TASK, THREE)
+    assert not play_shortcut(TASK, THREE, "cone_at_the_bottom", world).solved
+    assert any(world.tilt(name) > FALL_ANGLE for name in NAMES) and has_missed(THREE, world, NOT_ON_CONE)
 
 
 def test_a_cone_that_starts_on_the_widest_shape_must_come_off_first():
     perched = ShapeStack(count=3, perched=1)
     assert play(TASK, perched, perched.oracle).solved
-    unmoved = play(TASK, perched, lambda world: perched.pile(world, perched.order))
-    assert unmoved.reason == "a shape was set on the cone"
+    world = load(TASK, perched)
+    unmoved = play(TASK, perched, lambda world: perched.pile(world, perched.order), world)
+    assert not unmoved.solved and has_missed(perched, world, NOT_ON_CONE)
 
 
 def test_a_cone_that_is_set_on_a_shape_is_not_what_is_set_on_the_cone():
@@ -113,13 +120,13 @@ def test_a_cone_that_is_set_on_a_shape_is_not_what_is_set_on_the_cone():
     assert world.touching(THREE.order[-1], THREE.order[-2]) and not THREE.cone_tried(world)
 
 
-def test_what_lies_on_its_side_is_lost_unless_it_is_held():
+def test_what_lies_on_its_side_was_not_kept_upright():
     world = load(TASK, THREE)
     at = world.model.jnt_qposadr[world.model.body(NAMES[1]).jntadr[0]]
     world.data.qpos[at + 3 : at + 7] = [0.7071, 0.0, 0.7071, 0.0]
     world.data.qpos[at + 2] += 0.05
     world.step(IDLE)
-    assert THREE.failure(world) == "a shape toppled"
+    assert missed(THREE, world, "each shape was kept upright") and not missed(THREE, world, NOT_ON_CONE)
 
 
 def test_without_the_cone_the_pile_is_not_complete():
@@ -149,7 +156,7 @@ def test_memorised_actions_are_lost_where_the_shapes_are_higher():
 
 
 def test_an_oracle_that_does_not_look_at_the_shapes_is_not_certified():
-    not_certified(TASK, mistaken(ShapeStack, "as_they_stand")(count=3), "solved", "a shape was set on the cone")
+    not_certified(TASK, mistaken(ShapeStack, "as_they_stand")(count=3), "solved", "the oracle failed")
 
 
 def test_what_is_refuted_is_refuted_for_reasons_of_its_own():

@@ -239,13 +239,16 @@ def test_an_object_that_falls_off_the_table_is_lost(solved):
 
 @dataclass(frozen=True, kw_only=True)
 class Roofless(ShelteredGrasp):
-    """Nothing covers the object: the upper storey is gone, and the roof of the lower one."""
+    """Nothing covers the object: the upper storey is gone, and the roof of the lower one. Any way out counts."""
 
     def build(self):
         scene = super().build()
         for name in ("floor_1", "floor_2"):
             scene.delete(scene.geom(f"rack/{name}"))
         return scene
+
+    def means(self):
+        return {}
 
 
 @dataclass(frozen=True, kw_only=True)

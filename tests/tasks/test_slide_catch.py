@@ -10,6 +10,7 @@ from controls import (
     ablated,
     each_refuted_for_its_own_reason,
     load,
+    missed,
     mistaken,
     not_certified,
     play,
@@ -25,6 +26,7 @@ from scengen import load_task
 from scengen.assets.catch_bin import CatchBin
 from scengen.assets.incline import Incline
 from scengen.episode import Episode
+from scengen.means import MISSED
 from scengen.physics import slid
 from scengen.tasks.slide_catch import FALL_TIME, ORDERS, Load, SlideCatch
 
@@ -134,15 +136,16 @@ def test_one_of_six_sequences_is_right():
     assert not play(TASK, SLIDING, lambda world: answer.act(world, wrong)).solved
 
 
-# --- rules --------------------------------------------------------------------------------
+# --- means --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [("herd_them_together", "the bin touched a block on the ramp"), ("take_them_by_hand", "the robot touched a block")],
-)
-def test_blocks_are_left_alone_until_they_fall(name, says):
-    assert says in play_shortcut(TASK, SLIDING, name).reason
+@pytest.mark.parametrize(("name", "meddler"), [("herd_them_together", "bin"), ("take_them_by_hand", "robot")])
+def test_blocks_that_are_herded_or_taken_do_not_slide_by_themselves(name, meddler):
+    """Some of them also fall on the table."""
+    world = load(TASK, SLIDING)
+    assert play_shortcut(TASK, SLIDING, name, world).reason == "a block fell on the table"
+    assert any(world.touched(meddler, block) for block in SLIDING.blocks)
+    assert world.shown[list(SLIDING.means()).index("each block slid by itself")] == MISSED
 
 
 @pytest.mark.parametrize(("angle", "lost"), [(4.5, False), (-5.5, True)])
@@ -153,7 +156,7 @@ def test_once_the_ramp_tilts_the_bin_must_be_square_to_the_lip(angle, lost):
     for after, now in ((-0.1, False), (0.1, lost)):
         world.data.time = NOMINAL.start + after
         mujoco.mj_kinematics(world.model, world.data)
-        assert NOMINAL.turned(world) == now
+        assert NOMINAL.turned(world) == now == missed(NOMINAL, world, "the bin stood upright and square to the lip")
 
 
 # --- scenes that must not be certified ----------------------------------------------------

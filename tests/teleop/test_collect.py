@@ -12,9 +12,9 @@ from helpers import REFERENCE
 from scengen import cli
 from scengen.cli.commands import BAD_INPUT, FAILED, OK
 from scengen.demos.teleop.pad import read_events
+from scengen.means import throughout
 from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations, write_demonstrations
 from scengen.pool.files import sha256
-from scengen.means import throughout
 from scengen.tasks.domino_single import DominoSingle
 
 

@@ -168,8 +168,8 @@ def test_a_shortcut_that_works_refutes_the_scene():
     class Permissive(DominoSingle):
         """The paper's own rule, under which pushing the last tile is as good as pushing the first."""
 
-        def failure(self, world):
-            return "the robot touched the slab" if world.touched(ROBOT, "slab") else None
+        def means(self):
+            return {}
 
     certificate = certify(Permissive(), HORIZON, CertifySettings()).certificate
     assert certificate.verdict == "refuted" and "'push_the_last_tile' reaches the goal" in certificate.reason
@@ -248,6 +248,9 @@ def test_a_success_that_does_not_last_is_none():
     class Fleeting(DominoSingle):
         def success(self, world):
             return 1.0 < world.time < 1.2
+
+        def means(self):
+            return {}
 
     episode = run(Fleeting(), world_of(DominoSingle()), DominoSingle().oracle, HORIZON)
     assert episode.outcome == "timeout" and "did not last" in episode.reason

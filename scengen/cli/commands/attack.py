@@ -57,7 +57,7 @@ def command(arguments: Arguments) -> int:
         warn(f"REFUTED {names[hit.scenario]} {hit}; {hit.name}.npz")
     above = list(report.above_limits(subjects[0].scenario.answer()))
     for line, shown in above:
-        warn(f"TOO EASY {line}" if shown else f"perhaps too easy: {line}; a larger n= or budget= would tell")
+        warn(f"TOO EASY {line}" if shown else f"perhaps too easy: {line}; raise n= or budget=")
     cost = f"{report.cpu / max(report.rollouts, 1):.2f} CPU s per rollout"
     say(f"{report.rollouts} rollouts on {len(report.scenarios)} scenarios, {cost}; hits are in {folder}")
     if settings.json:
