@@ -19,7 +19,7 @@ LAYERS = (
     ("predicates", "scenario"),
     ("episode", "skills", "samplers"),
     ("tasks", "work"),
-    ("pool",),
+    ("pool", "perturb"),
     ("validate",),
     ("attack", "compose", "pictures"),
     ("evidence", "runs", "envs", "intake"),
@@ -35,7 +35,7 @@ LAYERS = (
 """Packages and modules of scengen from the ground up. Those of one line must not import each other."""
 WINGS = {
     "core": """errors geometry installation compat decisions html_tables orientation params physics symmetry robots
-        control sim assets means predicates scenario episode skills samplers tasks work compose""",
+        control sim assets means predicates scenario episode skills samplers tasks work compose perturb""",
     "proof": "certificate validate attack evidence conformance measures",
     "data": "pool runs demos export intake",
     "study": "learn evaluate ood agents bench drift",

@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..perturb.perturbation import LEVELS, kinds
-from ..perturb.proofs import Proof, staged
 from ..samplers.split import ID
 from ..samplers.task import Task
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from .measurement import Job, Measurement, Result, Row
+from .proofs import Proof, staged
 from .scenarios import feasible
 
 

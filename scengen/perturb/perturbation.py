@@ -1,8 +1,8 @@
 """Perturbations by name and level, and what they draw for a scenario.
 
-`light_direction@3+noise@1` is two kinds at their levels. What is drawn depends on kind, scenario and seed, and its
-strength on the level: the same scenario looks the same in each episode, in each process, and beside any other
-perturbation, and a higher level goes farther in the same direction.
+`light_direction@3+noise@1` is two kinds at their levels. Values depend on kind, scenario and seed, and their strength on
+the level: a scenario looks the same in each episode and process, also with further kinds, and a higher level goes
+farther in the same direction.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

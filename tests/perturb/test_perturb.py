@@ -13,10 +13,10 @@ from scengen.compose import load_task
 from scengen.envs.gym import PoolEnv
 from scengen.envs.vector import PoolVectorEnv
 from scengen.errors import BadConfig, UnknownName
+from scengen.measures.proofs import staged
 from scengen.perturb import effects, perturbation
 from scengen.perturb.effects import EFFECTS, EYE, PICTURES
 from scengen.perturb.perturbation import LEVELS, Perturbation, kinds
-from scengen.perturb.proofs import staged
 from scengen.pool import Pool
 
 drawing = pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL")

@@ -13,11 +13,11 @@ from ..envs.object_state import ObjectState
 from ..envs.observations import Stream, cameras_of, privileged, streams_of
 from ..episode import Actions, Episode
 from ..orientation import Orientation
+from ..perturb.effects import PICTURES
+from ..perturb.perturbation import LEVELS, Drawn, Kind, Perturbation, affects, stream_kind
 from ..pictures.render import Camera, Picture
 from ..scenario import Scenario
 from ..sim.world import World
-from .effects import PICTURES
-from .perturbation import LEVELS, Drawn, Kind, Perturbation, affects, stream_kind
 
 SIZE = 128
 """Edge of the pictures that are compared [pixels]."""
