@@ -307,7 +307,7 @@ HEAD = """# Results
 
 <!-- Written by `make results` -->
 
-One line for each task, on its version of today. *-* says that this version was not measured. The name of a task leads
+One line for each task, on the newest version that was measured. *-*: not measured. The name of a task leads
 to its page in the built documentation (`make docs`), and on GitHub to its picture.
 
 * **ID**, **axes**: scenarios certified at level `quick`, of the draws tried in training and on all axes together.
@@ -338,7 +338,7 @@ def result(task: Task) -> list[str]:
     return [
         f"[{task.name}](tasks/{task.name}.jpg)",
         task.code,
-        str(task.version),
+        str(own.version if own else task.version),
         certified_of([own] if own else []),
         certified_of([row for split, row in found.items() if split in task.axes]),
         broken([task]),
