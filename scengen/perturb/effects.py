@@ -272,7 +272,7 @@ EFFECTS: Mapping[str, Effect] = {
     "ambient": Effect(_brighter, on_model=_scale("head_ambient")),
     "shadow": Effect(lambda strength, rng: {"shift": strength}, on_model=_contrast),
     "table_colour": Effect(_colour, on_model=_paint("table_top")),
-    "floor_colour": Effect(_colour, on_model=_paint("floor")),
+    "floor_colour": Effect(_colour, cameras=FIXED, on_model=_paint("floor")),
     "camera_position": Effect(_shift, cameras=FIXED, on_model=_move_cameras(FIXED)),
     "camera_angle": Effect(_turn, cameras=FIXED, on_model=_move_cameras(FIXED)),
     "camera_fov": Effect(_zoom, on_model=_move_cameras(EVERY)),
