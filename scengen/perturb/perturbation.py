@@ -1,6 +1,6 @@
 """Perturbations by name and level, and what they draw for a scenario.
 
-`light_direction@3+noise@1` is two kinds at their levels. Values depend on kind, scenario and seed, and their strength on
+`light_direction@3+noise@1` is two kinds at their levels. Values depend on kind, scenario and seed; their strength on
 the level: a scenario looks the same in each episode and process, also with further kinds, and a higher level goes
 farther in the same direction.
 """
