@@ -153,15 +153,14 @@ class AttackReport:
         Yields:
             The rate and its limit as text, and whether the rate's lower 95 % bound exceeds the limit, too.
         """
-        counts = {rate.tier: (0, 0) for rate in self.rates}
-        for rate in self.rates:
-            hits, rollouts = counts[rate.tier]
-            counts[rate.tier] = hits + rate.hits, rollouts + rate.rollouts
-        for prior in self.priors:
-            if prior.fresh is not None:
-                counts[f"{PRIOR}_{len(prior.values)}"] = round(prior.fresh * prior.draws), prior.draws
+        fresh = {
+            f"{PRIOR}_{len(prior.values)}": (round(prior.fresh * prior.draws), prior.draws)
+            for prior in self.priors
+            if prior.fresh is not None
+        }
         for name, limit in LIMITS.items():
-            hits, runs = counts.get(name, (0, 0))
+            played = [rate for rate in self.rates if rate.tier == name]
+            hits, runs = fresh.get(name, (sum(r.hits for r in played), sum(r.rollouts for r in played)))
             tier, _, number = name.partition("_")
             if tier == PRIOR and answer is not None:
                 limit = max(limit, int(number) / len(answer.candidates) + CHOICE_MARGIN)

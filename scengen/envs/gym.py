@@ -366,10 +366,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self.close()
             self._world = stored_world(row, self._needs_pictures)
             self._scenario = self.task.scenario(row.params)
-            bodies = [self._world.model.body(number).name for number in range(self._world.model.nbody)]
+            model = self._world.model
+            bodies = [model.body(number).name for number in range(model.nbody)] if self.perturbation else ()
             self.drawn = self.perturbation.of(row.id, self._perturb_seed, bodies)
             if self._needs_pictures:
-                self.drawn.on_model(self._world.model)
+                self.drawn.on_model(model)
         self._row = row
         self._played: list[NDArray[np.float32]] = []
         self._world.reset()
@@ -425,8 +426,12 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return {**read, **{name: self._picture(camera) for name, camera in self.observed.cameras.items()}}
 
     def _perceived(self, name: str, reading: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A reading of a stream under the perturbation."""
-        return self.drawn.on_reading(name, self.streams[name].entries(name), reading, self._period)
+        """A reading of a stream under the perturbation, if there is one."""
+        return (
+            self.drawn.on_reading(name, self.metadata["names"][name], reading, self._period)
+            if self.perturbation
+            else reading
+        )
 
     @property
     def _period(self) -> int:

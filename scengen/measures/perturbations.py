@@ -1,6 +1,7 @@
 """Measurement of perturbations: the proofs of every kind and level on scenarios of each task."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import count, islice
 from typing import Any, ClassVar
@@ -13,7 +14,7 @@ from ..samplers.task import Task
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from .measurement import Job, Measurement, Result, Row
-from .proofs import Proof, staged
+from .proofs import Proof, Stage
 from .scenarios import feasible
 
 
@@ -41,7 +42,7 @@ class Proofs(Measurement):
         cells: dict[tuple[str, int], list[Proof]] = {}
         for scenario in islice(feasible(task, ID, count()), self.options["n"]):
             played = run(scenario, world_of(scenario, task.embodiment), scenario.oracle, task.horizon)
-            with staged(scenario, rebuild(scenario), task.embodiment, played.actions) as stage:
+            with closing(Stage(scenario, rebuild(scenario), task.embodiment, played.actions)) as stage:
                 for kind in kinds().values():
                     for level in range(1, LEVELS + 1):
                         cells.setdefault((kind.name, level), []).append(stage.proof(kind, level))

@@ -1,10 +1,8 @@
 """Proofs that a perturbation leaves the physics alone, changes what is perceived, and hides nothing that matters."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +13,7 @@ from ..episode import Actions, Episode
 from ..orientation import Orientation
 from ..perturb.effects import PICTURES
 from ..perturb.perturbation import LEVELS, Drawn, Kind, Perturbation, affects, stream_kind
-from ..pictures.render import Camera, Picture
+from ..pictures.render import Camera, Picture, things
 from ..scenario import Scenario
 from ..sim.world import World
 
@@ -136,13 +134,10 @@ class Stage:
     def _counts(self, ids: Ids) -> dict[str, dict[str, int]]:
         """Number of pixels of each body of the scene in each camera."""
         model, found = self.world.model, dict[str, dict[str, int]]()
+        bodies = np.unique(model.geom_bodyid[things(self.world)])
         for name, seen in ids.items():
-            bodies, counts = np.unique(seen[seen > 0], return_counts=True)
-            found[name] = {
-                model.body(body).name: int(count)
-                for body, count in zip(bodies.tolist(), counts.tolist(), strict=True)
-                if model.body(body).name not in ("world", "table") and not _of_robot(model, body)
-            }
+            shown, counts = np.unique(seen[np.isin(seen, bodies)], return_counts=True)
+            found[name] = {model.body(b).name: c for b, c in zip(shown.tolist(), counts.tolist(), strict=True)}
         return found
 
     @staticmethod
@@ -168,15 +163,3 @@ class Stage:
     def _all_streams(self) -> Mapping[str, Stream]:
         state = ObjectState(dict.fromkeys(self.world.free_bodies, True), len(self.world.arms))
         return {**self.streams, **privileged(state, type(self.scenario), Orientation)}
-
-
-def _of_robot(model: mujoco.MjModel, body: int) -> bool:
-    root = model.body(model.body_rootid[body]).name
-    return root.startswith(("robot", "gripper", "base", "mount", "fixed_mount"))
-
-
-@contextmanager
-def staged(scenario: Scenario, scene_xml: str, embodiment: str, witness: Actions) -> Iterator[Stage]:
-    """A stage that is closed at the end of a `with` statement."""
-    with closing(Stage(scenario, scene_xml, embodiment, witness)) as stage:
-        yield stage

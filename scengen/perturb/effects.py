@@ -151,14 +151,14 @@ def _paint(geom: str) -> Callable[[mujoco.MjModel, Values], None]:
 # --- cameras ------------------------------------------------------------------------------------
 
 
-def _chosen_cameras(model: mujoco.MjModel, which: str) -> list[int]:
-    wrist = {number: model.camera(number).name.endswith(EYE) for number in range(model.ncam)}
-    return [number for number, on_wrist in wrist.items() if which == EVERY or on_wrist == (which == WRIST)]
+def is_among(camera: str, which: str) -> bool:
+    """Whether a camera, given robosuite's name, is one of `FIXED`, `WRIST` or `EVERY`."""
+    return which == EVERY or camera.endswith(EYE) == (which == WRIST)
 
 
 def _move_cameras(which: str) -> Callable[[mujoco.MjModel, Values], None]:
     def change(model: mujoco.MjModel, values: Values) -> None:
-        for number in _chosen_cameras(model, which):
+        for number in (n for n in range(model.ncam) if is_among(model.camera(n).name, which)):
             if "way" in values:
                 model.cam_pos[number] += np.asarray(values["way"], float)
             if "turn" in values:
@@ -251,7 +251,7 @@ def _noise(entries: Sequence[str], reading: Reading, values: Values, rng: Random
 
 
 def _bias(entries: Sequence[str], reading: Reading, values: Values, rng: Random) -> Reading:
-    """The same error throughout an episode: an entry's sign follows from its name and the values alone."""
+    """The same error throughout an episode: an entry's sign follows from its place and the values alone."""
     signs = np.random.default_rng(int(np.asarray(values["key"]))).choice([-1.0, 1.0], reading.shape)
     return _erring(entries, reading, signs * float(np.asarray(values["bias"])))
 

@@ -20,17 +20,15 @@ from ..samplers.task_files import conf_dir
 from ..work.plain import read_yaml
 from .effects import (
     EFFECTS,
-    EYE,
-    FIXED,
     OBJECTS,
     PICTURES,
     PROPRIOCEPTION,
     WRENCH,
-    WRIST,
     Effect,
     Picture,
     Reading,
     Values,
+    is_among,
 )
 
 LEVELS = 5
@@ -83,6 +81,17 @@ def kinds() -> Mapping[str, Kind]:
     return found
 
 
+def kind_of(name: str) -> Kind:
+    """The kind of this name.
+
+    Raises:
+        UnknownName: there is none.
+    """
+    if name not in kinds():
+        raise UnknownName("perturbation", name, kinds())
+    return kinds()[name]
+
+
 @dataclass(frozen=True)
 class Perturbation:
     """Some kinds at their levels."""
@@ -101,8 +110,7 @@ class Perturbation:
         parts = list[tuple[str, int]]()
         for one in (text or "").split("+") if text not in (None, "", NONE) else ():
             name, at, level = one.strip().partition("@")
-            if name not in kinds():
-                raise UnknownName("perturbation", name, kinds())
+            kind_of(name)
             if not at or not level.isdigit() or not 1 <= int(level) <= LEVELS:
                 raise BadConfig(f"perturb = {text}; give {name} a level from 1 to {LEVELS}, such as {name}@3")
             if name in dict(parts):
@@ -238,10 +246,7 @@ def arrays(model: mujoco.MjModel) -> dict[str, NDArray[np.generic]]:
 
 def affects(effect: Effect, camera: str) -> bool:
     """Whether an effect shows in a camera, given robosuite's name."""
-    on_wrist = camera.endswith(EYE)
-    return effect.reads == PICTURES and not (
-        (effect.cameras == FIXED and on_wrist) or (effect.cameras == WRIST and not on_wrist)
-    )
+    return effect.reads == PICTURES and is_among(camera, effect.cameras)
 
 
 def stream_kind(stream: str) -> str:

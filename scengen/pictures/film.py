@@ -4,6 +4,7 @@ import io
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -72,8 +73,9 @@ class Take:
             done = period
             yield f"{period * Loop.PERIOD:.2f} s{note}"
 
+    @cached_property
     def ways(self) -> list["Way"]:
-        """Replay the actions, and say of each mean of the task when it was decided."""
+        """When each mean of the task was decided, as a replay of the actions shows."""
         episode = Episode(self.scenario, World.load(self.scene_xml, self.embodiment), rules=self.rules)
         at = dict[str, tuple[float, float]]()
         for number, action in enumerate(self.actions, 1):
@@ -168,7 +170,7 @@ def strip(
         moments = [(eye.world.state(), caption) for caption in take.moments(eye.world, take.even(frames))]
         if camera is None:
             eye.look([state for state, _ in moments])
-        ways = take.ways()
+        ways = take.ways
         for state, caption in moments:
             eye.world.restore(state)
             pictures.append(captioned(eye.take(camera), caption))

@@ -1,6 +1,6 @@
 """A sheet of perturbations: the start of a scenario, clean and at every level of some kinds."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 
 import numpy as np
@@ -10,11 +10,8 @@ from ..perturb.perturbation import LEVELS, Kind, Perturbation, affects
 from ..pool import PoolRow
 from ..scenario import Scenario
 from ..validate.playable import stored_world
-from .film import captioned
+from .film import Progress, captioned
 from .render import Camera, Picture
-
-Progress = Callable[[int, int], None]
-"""Function that gets the number of finished pictures and the number of all."""
 
 
 def sheet(

@@ -131,7 +131,7 @@ class SlideCatch(Scenario):
 
         def awaited(world: World, block: str) -> bool:
             aside = abs(float(world.pos("bin")[1] - world.com(block)[1])) < (self.bin.length - self.edge) / 2
-            slides = -float(world.velocity(block)[3:] @ world.rot("incline/slab")[:, 0]) > SLIDE_SPEED
+            slides = -float(world.velocity(block)[3:] @ world.rot(SLAB)[:, 0]) > SLIDE_SPEED
             return aside or not slides or not on_ramp(world, block)
 
         def meddles(world: World, block: str) -> bool:

@@ -74,7 +74,7 @@ def test_a_strip_begins_at_the_start_and_ends_when_the_witness_does(row, scenari
     take, above = film.Take.witness(row, scenario), slice(0, 45)
     picture = film.strip(take, frames=3, width=96, height=72, camera="agentview")
     picture, below = picture[:72], picture[72:]
-    assert picture.shape == (72, 288, 3) and (below == film.timeline(take.ways(), take.seconds, 288)).all()
+    assert picture.shape == (72, 288, 3) and (below == film.timeline(take.ways, take.seconds, 288)).all()
     with render.camera(row.scene_xml, row.embodiment, 96, 72) as eye:
         assert (picture[above, :96] == eye.take("agentview")[above]).all()
         for action in row.witness:
@@ -93,12 +93,12 @@ def test_captions_tell_time_and_the_moment_of_success(row, scenario):
 def test_ways_say_when_each_mean_was_decided(row, scenario):
     take = film.Take.witness(row, scenario)
     (witness,) = [check for check in row.certificate.checks if check.name == "witness"]
-    ways = {way.name: way for way in take.ways()}
+    ways = {way.name: way for way in take.ways}
     assert {way.found for way in ways.values()} == {SHOWN} and ways.keys() == scenario.means().keys()
     assert 0.0 < ways["each tile struck the next"].seconds <= witness.numbers["seconds"] < take.seconds
     assert ways["the robot touched the first tile alone"].seconds == take.seconds
     idle = replace(take, actions=np.zeros((30, 7), np.float32))
-    assert str(idle.ways()[2]) == "- each tile struck the next (not shown by 0.30 s)"
+    assert str(idle.ways[2]) == "- each tile struck the next (not shown by 0.30 s)"
 
 
 def test_a_timeline_marks_where_a_mean_was_shown_and_missed():

@@ -58,13 +58,12 @@ def command(arguments: Arguments) -> int:
     above = list(report.above_limits(subjects[0].scenario.answer()))
     for line, shown in above:
         warn(f"TOO EASY {line}" if shown else f"perhaps too easy: {line}; raise n= or budget=")
+    easy = [line for line, shown in above if shown]
     cost = f"{report.cpu / max(report.rollouts, 1):.2f} CPU s per rollout"
     say(f"{report.rollouts} rollouts on {len(report.scenarios)} scenarios, {cost}; hits are in {folder}")
     if settings.json:
-        easy = [line for line, shown in above if shown]
         write_json(settings.json, {**report.plain(), "too_easy": easy, "leaks": plain})
-    too_easy = any(shown for _, shown in above)
-    return FAILED if report.refuting or too_easy else BAD_INPUT if report.lost else OK
+    return FAILED if report.refuting or easy else BAD_INPUT if report.lost else OK
 
 
 def _leaks(task: Task, settings: AttackSettings) -> Leaks:

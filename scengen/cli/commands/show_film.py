@@ -89,7 +89,7 @@ def command(arguments: Arguments) -> int:
             write(target, encode(strip(take, settings.frames, *size, settings.eye, bar.of), "png"))
         else:
             movie(take, target, settings.fps, *size, settings.eye, bar.of)
-    for way in take.ways():
+    for way in take.ways:
         say(str(way))
     say(f"wrote {target}: {take.seconds:g} s")
     return OK

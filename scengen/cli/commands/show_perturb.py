@@ -6,7 +6,7 @@ from pathlib import Path
 from ...envs.observations import cameras_of
 from ...errors import BadConfig, UnknownName
 from ...ood.analysis.redraw import task_of
-from ...perturb.perturbation import Perturbation, kinds
+from ...perturb.perturbation import Perturbation, kind_of, kinds
 from ...pictures.perturbed import sheet
 from ...pictures.render import check_pictures, encode
 from ...runs.progress import ProgressBar
@@ -40,8 +40,9 @@ def command(arguments: Arguments) -> int:
     if Path(settings.to).suffix not in (".png", ".webp"):
         raise BadConfig(f"to = {settings.to}; give a .png or .webp file")
     try_file(settings.to)
-    names = [one.partition("@")[0] for one in settings.perturb.split("+")]
-    wanted = list(kinds().values()) if settings.perturb == EVERY else [kinds()[name] for name in _known(names)]
+    every = settings.perturb == EVERY
+    names = kinds() if every else [one.partition("@")[0] for one in settings.perturb.split("+")]
+    wanted = [kind_of(name) for name in names]
     check_pictures()
     pool = holder(settings.pool, settings.id)
     row = check_row(chosen(pool, settings.id))
@@ -49,7 +50,7 @@ def command(arguments: Arguments) -> int:
     if settings.camera not in cameras:
         raise UnknownName("camera", settings.camera, cameras)
     camera = cameras[settings.camera]
-    for kind in wanted if settings.perturb != EVERY else ():
+    for kind in () if every else wanted:
         Perturbation(((kind.name, 1),)).check((), [camera])
     scenario = task_of(pool, search_path(arguments)).scenario(row.params)
     with ProgressBar(err, "sheet", 1) as bar:
@@ -59,10 +60,3 @@ def command(arguments: Arguments) -> int:
         say(f"{kind.name}: {', '.join(f'{each:g}' for each in kind.strengths)} {kind.unit}. {kind.why}")
     say(f"wrote {settings.to}")
     return OK
-
-
-def _known(names: list[str]) -> list[str]:
-    for name in names:
-        if name not in kinds():
-            raise UnknownName("perturbation", name, [*kinds(), EVERY])
-    return names
