@@ -146,7 +146,7 @@ def test_a_pool_of_too_few_scenarios_or_of_another_task_is_refused(capsys):
     assert "is a pool of domino_single; give task=domino_single" in capsys.readouterr().err
 
 
-@pytest.mark.long  # 9 rollouts: 20 s
+@pytest.mark.each_change  # 9 rollouts: 20 s
 def test_a_fixed_bearing_within_the_tolerance_solves_and_the_control_does_not(capsys):
     assert cli.run(["axis", "cues", "task=indirect_push", "blind=bearing", "axis_n=3"]) == 0
     shown = capsys.readouterr().out

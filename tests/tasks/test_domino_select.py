@@ -243,12 +243,12 @@ NEGATIVES = {
     "gap that is mended": (
         Mended(count=3),
         "shortcuts",
-        f"'topple_chain_0' was not seen to its end (filtered): {OTHERWISE}",
+        f"'topple_chain_0' reaches the goal (filtered): {OTHERWISE}",
     ),
     "drift that slides across": (
         DominoSelect(second=Defect(kind=DRIFT, stretch=1.02)),
         "shortcuts",
-        f"'topple_chain_1' was not seen to its end (filtered): {OTHERWISE}",
+        f"'topple_chain_1' reaches the goal (filtered): {OTHERWISE}",
     ),
     "rule that hides what works": (
         Hidden(count=3),
