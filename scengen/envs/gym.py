@@ -28,7 +28,8 @@ from ..episode import STRICT, Actions, Episode, Outcome, Rules, check_rules
 from ..errors import BadConfig, ScengenError, UnknownName, Unstable, cut
 from ..orientation import Orientation
 from ..params import Value
-from ..perturb.perturbation import Perturbation
+from ..perturb.language import Words
+from ..perturb.perturbation import Late, Perturbation
 from ..pictures.opengl import check_size
 from ..pictures.render import Camera
 from ..pool import PoolRow
@@ -186,7 +187,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode, self.camera = render_mode, camera
         self.action_filter, self.settle, self.action_repeat = action_filter, settle, action_repeat
         self.rules: Rules = rules
-        self.perturbation, self._perturb_seed = Perturbation.parse(perturb), perturb_seed
+        self.perturbation, self._perturb_seed, self._search = Perturbation.parse(perturb), perturb_seed, search
         self.task: Task = compose.load_task(task, search)
         rows = rows_of(pool, task)
         self._arguments["pool"] = located(pool)
@@ -229,8 +230,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def task_description(self) -> str:
-        """The instruction of the running scenario."""
-        return self._row.instruction
+        """The instruction of the running scenario, as a perturbation words it."""
+        return (self.drawn.instruction if self._world else None) or self._row.instruction
 
     @property
     def horizon(self) -> float:
@@ -348,7 +349,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             return made
         episode = (self._episode.outcome, self._episode.reason, self._episode.held, self._episode.lacks)
         entry = {"scenario": self._row.id, "world": self._world.state(), "episode": episode}
-        return {**made, **entry, "played": [*self._played]}
+        return {**made, **entry, "played": [*self._played], "late": self._late.taken}
 
     def _continue(self, progress: Mapping[str, Any]) -> None:
         """Return to a `_progress()` of an environment with the same arguments."""
@@ -356,6 +357,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._load(self._rows[self._rows.find(progress["scenario"])])
             self.world.restore(progress["world"])
             self._played = [*progress["played"]]
+            self._late.taken = progress["late"]
             episode = self._episode
             episode.outcome, episode.reason, episode.held, episode.lacks = progress["episode"]
         self._next = progress["next"]
@@ -368,10 +370,12 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._scenario = self.task.scenario(row.params)
             model = self._world.model
             bodies = [model.body(number).name for number in range(model.nbody)] if self.perturbation else ()
-            self.drawn = self.perturbation.of(row.id, self._perturb_seed, bodies)
+            words = Words.of(row.task, row.instruction, self._search) if self.perturbation.has_words else None
+            self.drawn = self.perturbation.of(row.id, self._perturb_seed, bodies, words)
             if self._needs_pictures:
                 self.drawn.on_model(model)
         self._row = row
+        self._late = Late(self.drawn.delay)
         self._played: list[NDArray[np.float32]] = []
         self._world.reset()
         self._episode = Episode(self._scenario, self._world, row.horizon, self.rules)
@@ -442,6 +446,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._renderer is None:
             self._renderer = Camera(self.world, self.observed.width, self.observed.height)
         picture = self._scenario.orientation.apply(self._renderer.take(camera)).copy()
+        if self.drawn.delay:
+            picture = self._late.arriving(camera, self.world.time, picture)
         return self.drawn.on_picture(picture, camera, self._period)
 
     def _info(self, reason: str, success: bool) -> dict[str, Any]:

@@ -15,9 +15,10 @@ from ..learn.store import is_policy, read_settings
 from ..perturb.perturbation import Perturbation
 from ..pool import collection
 from ..work.limits import at_least
+from ..work.foreign import is_factory
 from ..work.parallel import Workers
 from .policies import FULL_RATE_POLICIES
-from .remote.client import ClientSettings, address_of, is_address, read_client
+from .remote.client import INSTRUCTION, ClientSettings, address_of, is_address, read_client
 
 ALL = "all"
 """Name of all splits of the pools."""
@@ -111,6 +112,13 @@ class EvaluateSettings:
         """Names of observations and actions of a policy behind a socket; None for other policies."""
         return read_client(self.client, address_of(self.name)) if is_address(self.name) else None
 
+    @property
+    def _gets_text(self) -> bool:
+        """Whether the policy may read the instruction: code of its own may, a server if its client file names it."""
+        if self.remote:
+            return any(INSTRUCTION in names for names in self.remote.observation.values())
+        return is_factory(self.name)
+
     def check_pools(self) -> None:
         """Raise `BadConfig` unless the settings name pools, or sets of an edition."""
         if self.pool is None and self.edition is None:
@@ -124,7 +132,8 @@ class EvaluateSettings:
         """Raise `ScengenError` if a setting is not valid."""
         check_filter(self.action_filter)
         check_rules(self.rules)
-        Perturbation.parse(self.perturb)
+        if Perturbation.parse(self.perturb).has_words and not self._gets_text:
+            raise BadConfig(f"perturb = {self.perturb}; policy {self.name} gets no text: leave out what changes the text")
         if self.splits not in SPLITS:
             raise UnknownName("splits", self.splits, SPLITS)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1, perturb_seed=0)

@@ -8,6 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..params import parameters
+from ..perturb.language import WORDINGS, Words
 from ..perturb.perturbation import LEVELS, kinds
 from ..samplers.split import ID
 from ..samplers.task import Task
@@ -39,11 +41,14 @@ class Proofs(Measurement):
 
     def result(self, job: Job) -> Result:
         task = job.task
+        words = Words.of(task.name, task.instruction, self.search)
+        secrets = [*task.axes, *kinds(), *(p.name for p in parameters(task.family()) if p.hidden)]
         cells: dict[tuple[str, int], list[Proof]] = {}
         for scenario in islice(feasible(task, ID, count()), self.options["n"]):
             played = run(scenario, world_of(scenario, task.embodiment), scenario.oracle, task.horizon)
-            with closing(Stage(scenario, rebuild(scenario), task.embodiment, played.actions)) as stage:
-                for kind in kinds().values():
+            made = scenario, rebuild(scenario), task.embodiment, played.actions, words, secrets
+            with closing(Stage(*made)) as stage:
+                for kind in (k for k in kinds().values() if k.name not in WORDINGS or words.wordings):
                     for level in range(1, LEVELS + 1):
                         cells.setdefault((kind.name, level), []).append(stage.proof(kind, level))
         faults = {

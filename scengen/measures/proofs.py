@@ -1,6 +1,6 @@
 """Proofs that a perturbation leaves the physics alone, changes what is perceived, and hides nothing that matters."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,8 @@ from ..envs.object_state import ObjectState
 from ..envs.observations import Stream, cameras_of, privileged, streams_of
 from ..episode import Actions, Episode
 from ..orientation import Orientation
-from ..perturb.effects import PICTURES
+from ..perturb.effects import LANGUAGE, PICTURES
+from ..perturb.language import Words, leaks, other_words
 from ..perturb.perturbation import LEVELS, Drawn, Kind, Perturbation, affects, stream_kind
 from ..pictures.render import Camera, Picture, things
 from ..scenario import Scenario
@@ -25,10 +26,14 @@ MIN_CHANGE = 1.0
 """Least mean difference of a picture, over pixels and channels, in the moment at which it is largest [grey levels]."""
 MIN_READING_CHANGE = 1e-4
 """Least largest difference of a reading, in the moment at which it is largest [m, rad, N]."""
+PASSING = 25
+"""Number of control periods after a moment over which a kind is judged that changes some pictures only."""
 MIN_PIXELS = 8
 """Least number of pixels of a body in one camera, if that many show it in the clean picture of some camera."""
 MIN_SHARE = 0.25
 """Least share of the clean pixels of a body that the camera with most of them keeps."""
+INSTRUCTION = "instruction"
+"""Name of the text among the changes."""
 DARK = 64
 """Grey level below which a pixel of a white picture is covered."""
 SEEN = ("light_", "cam_", "geom_rgba", "mat_", "site_rgba", "tex_", "vis")
@@ -45,36 +50,54 @@ class Proof:
     neutral: bool
     """Whether the compiled scene differs only in what pictures alone use, and the witness ends in the same bits."""
     changes: Mapping[str, float]
-    """Largest change of each camera or stream that the kind affects, over the moments."""
-    hidden: tuple[str, ...]
+    """Largest change of each camera or stream that the kind affects, over the moments; share of other words of a text."""
+    hidden: tuple[str, ...] = ()
     """Bodies that no camera keeps in sight at a moment at which clean pictures show them."""
+    leaks: tuple[str, ...] = ()
+    """Names of what is shifted or hidden that the text has."""
 
     def faults(self) -> Iterator[str]:
         """What is not proved."""
         if not self.neutral:
             yield "the physics differs"
-        limit = {True: MIN_CHANGE, False: MIN_READING_CHANGE}
         for name, change in self.changes.items():
-            if change < limit["rgb" in name]:
+            if change < (MIN_CHANGE if "rgb" in name else MIN_READING_CHANGE):
                 yield f"{name} changes by {change:.2g} only"
         if not self.changes:
             yield "it changes nothing"
         for body in self.hidden:
             yield f"{body} is out of sight"
+        for name in self.leaks:
+            yield f"the text names {name}"
 
 
 class Stage:
     """A scenario with its witness, on which perturbations are tried one after the other."""
 
-    def __init__(self, scenario: Scenario, scene_xml: str, embodiment: str, witness: Actions):
-        self.scenario, self.scene_xml, self.embodiment, self.witness = scenario, scene_xml, embodiment, witness
+    def __init__(
+        self,
+        scenario: Scenario,
+        scene_xml: str,
+        embodiment: str,
+        witness: Actions,
+        words: Words,
+        secrets: Collection[str] = (),
+    ):
+        """
+        Args:
+            words: the instruction and others.
+            secrets: names that no text may have.
+        """
+        self.scenario, self.embodiment, self.witness = scenario, embodiment, witness
+        self.words, self.secrets = words, secrets
         self.world = World.load(scene_xml, embodiment, visual=True)
         self.cameras = cameras_of(embodiment)
         self.streams: dict[str, Stream] = streams_of(embodiment)
         self.eye = Camera(self.world, SIZE, SIZE)
         self.states, self.digest = self._played()
-        self.clean = [self._pictures(None, number) for number in range(MOMENTS)]
-        self.ids = [self._ids(number) for number in range(MOMENTS)]
+        self.moments = np.linspace(0, len(witness), MOMENTS).astype(int).tolist()
+        self.clean = [self._pictures(period, self.cameras) for period in self.moments]
+        self.ids = [self._ids(period) for period in self.moments]
         self.shown = [self._counts(ids) for ids in self.ids]
 
     def close(self) -> None:
@@ -82,47 +105,62 @@ class Stage:
 
     def proof(self, kind: Kind, level: int) -> Proof:
         """Try a kind at a level."""
-        drawn = Perturbation(((kind.name, level),)).of(self.scenario.id, bodies=self.world.free_bodies)
+        drawn = Perturbation(((kind.name, level),)).of(
+            self.scenario.id, bodies=self.world.free_bodies, words=self.words
+        )
         with drawn.while_applied(self.world.model) as changed:
             neutral = all(name.startswith(SEEN) for name in changed)
+            if kind.effect.reads == LANGUAGE:
+                return self._text_proof(drawn.instruction or "", not changed)
             if kind.effect.reads != PICTURES:
-                return Proof(neutral, self._reading_changes(kind, drawn), ())
+                return Proof(not changed, self._reading_changes(kind, drawn))
             seen = [name for name, camera in self.cameras.items() if affects(kind.effect, camera)]
-            moved = any(name.startswith("cam_") for name in changed)
             changes, hidden = dict.fromkeys(seen, 0.0), set[str]()
-            for number in range(MOMENTS):
-                for name, picture in self._pictures(drawn, number, seen).items():
-                    far = np.abs(picture.astype(float) - self.clean[number][name]).mean()
-                    changes[name] = max(changes[name], float(far))
-                ids = self._ids(number) if moved else self.ids[number]
-                hidden |= self._lost(self.shown[number], self._counts(self._uncovered(drawn, ids)))
-            if level == LEVELS:
+            for number, period in enumerate(self.moments):
+                at = max(0, period - round(drawn.delay / Loop.PERIOD))
+                is_drawn = bool(changed) or at != period
+                pictures = self._pictures(at, seen) if is_drawn else self.clean[number]
+                for name in seen:
+                    far = self._far(drawn, name, period, pictures[name], self.clean[number][name])
+                    changes[name] = max(changes[name], far)
+                if not kind.effect.is_passing:
+                    is_elsewhere = at != period or any(name.startswith("cam_") for name in changed)
+                    ids = self._ids(at) if is_elsewhere else self.ids[number]
+                    hidden |= self._lost(self.shown[number], self._counts(self._uncovered(drawn, ids)))
+            if level == LEVELS and changed:
                 neutral = neutral and self._played()[1] == self.digest
         return Proof(neutral, changes, tuple(sorted(hidden)))
 
+    def _text_proof(self, text: str, neutral: bool) -> Proof:
+        """How far a text is from the instruction, and what it gives away."""
+        given = self.words.instruction
+        changes = {INSTRUCTION: other_words(text, given)}
+        return Proof(neutral, changes, leaks=tuple(leaks(text, given, self.secrets)))
+
+    def _far(self, drawn: Drawn, name: str, period: int, picture: Picture, clean: Picture) -> float:
+        """Mean difference of a camera's picture from the clean one; of passing ones the mean over some periods."""
+        passing = any(effect.is_passing for effect in drawn.effects.values())
+        periods = range(period, period + (PASSING if passing else 1))
+        found = (drawn.on_picture(picture, self.cameras[name], each) for each in periods)
+        return float(np.mean([np.abs(one.astype(float) - clean).mean() for one in found]))
+
     def _played(self) -> tuple[list[NDArray[np.float64]], str]:
-        """States at the moments of the witness, and the hash of the last one."""
+        """States of the witness from the start on, one for each control period, and the hash of the last one."""
         self.world.reset()
-        episode, at = Episode(self.scenario, self.world), np.linspace(0, len(self.witness), MOMENTS).astype(int)
-        states = [self.world.state()] if at[0] == 0 else []
-        for number, action in enumerate(self.witness, 1):
+        episode, states = Episode(self.scenario, self.world), [self.world.state()]
+        for action in self.witness:
             episode.step(action)
-            states += [self.world.state()] * int((at == number).sum())
+            states.append(self.world.state())
         return states, self.world.digest
 
-    def _pictures(self, drawn: Drawn | None, number: int, names: Iterable[str] | None = None) -> dict[str, Picture]:
-        """Pictures of some cameras at a moment, by default of all."""
-        self.world.restore(self.states[number])
-        period = round(self.world.time / Loop.PERIOD)
-        chosen = self.cameras if names is None else names
-        found = {name: self.eye.take(self.cameras[name]).copy() for name in chosen}
-        if drawn is None:
-            return found
-        return {name: drawn.on_picture(picture, self.cameras[name], period) for name, picture in found.items()}
+    def _pictures(self, period: int, names: Iterable[str]) -> dict[str, Picture]:
+        """Pictures of some cameras in a control period of the witness."""
+        self.world.restore(self.states[period])
+        return {name: self.eye.take(self.cameras[name]).copy() for name in names}
 
-    def _ids(self, number: int) -> Ids:
-        """Number of the body in each pixel of each camera at a moment."""
-        self.world.restore(self.states[number])
+    def _ids(self, period: int) -> Ids:
+        """Number of the body in each pixel of each camera in a control period of the witness."""
+        self.world.restore(self.states[period])
         return {name: self.eye.bodies(camera) for name, camera in self.cameras.items()}
 
     def _uncovered(self, drawn: Drawn, ids: Ids) -> Ids:
@@ -153,9 +191,9 @@ class Stage:
         for name, stream in self._all_streams().items():
             if stream_kind(name) != kind.effect.reads or stream.grid:
                 continue
-            for state in self.states:
-                self.world.restore(state)
-                period, reading = round(self.world.time / Loop.PERIOD), np.asarray(stream.read(self.world), float)
+            for period in self.moments:
+                self.world.restore(self.states[period])
+                reading = np.asarray(stream.read(self.world), float)
                 far = np.abs(drawn.on_reading(name, stream.entries(name), reading.copy(), period) - reading)
                 changes[name] = max(changes.get(name, 0.0), float(far.max()))
         return changes

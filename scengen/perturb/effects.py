@@ -1,7 +1,7 @@
-"""What each kind of perturbation does to lights and cameras of a scene, to pictures, and to readings.
+"""What each kind of perturbation does to lights and cameras of a scene, to pictures, readings and instructions.
 
 An effect draws its values once for an episode, from a strength whose unit is the kind's own. It then changes the
-compiled scene, of which only pictures see lights, colours and cameras, or each picture, or each reading.
+compiled scene, of which only pictures see lights, colours and cameras, or each picture, each reading, or the text.
 """
 
 import io
@@ -16,6 +16,7 @@ from scipy.ndimage import gaussian_filter
 
 from ..assets.prop import TABLE_TOP
 from ..geometry import Vec3, rotation
+from .language import CLAUSES, WORDINGS, Words, extended, worded
 
 Values = Mapping[str, float | Sequence[float]]
 """Drawn values of a perturbation in an episode, by name, as they are stored."""
@@ -33,6 +34,8 @@ WRENCH = "wrench"
 """What a kind changes: force and torque of the wrist."""
 OBJECTS = "object-state"
 """What a kind changes: poses, velocities and sizes of bodies."""
+LANGUAGE = "the instruction"
+"""What a kind changes: the text that a policy is given."""
 FIXED = "fixed cameras"
 """Cameras that a kind changes: those that stand still."""
 WRIST = "wrist cameras"
@@ -61,6 +64,12 @@ class Effect:
     """Changes a picture; the random numbers belong to the picture's time and camera."""
     on_reading: Callable[[Sequence[str], Reading, Values, Random], Reading] | None = None
     """Changes a reading, given the full names of its entries; the random numbers belong to its time and stream."""
+    on_text: Callable[[str, Values, Words], str] | None = None
+    """Changes the instruction."""
+    is_passing: bool = False
+    """Whether it changes some pictures of an episode only, so that what it hides is seen again in the next ones."""
+    is_late: bool = False
+    """Whether pictures arrive `seconds` late."""
 
 
 def _sign(rng: Random) -> float:
@@ -222,6 +231,10 @@ def _cover(picture: Picture, values: Values, rng: Random) -> Picture:
     return covered
 
 
+def _drop(picture: Picture, values: Values, rng: Random) -> Picture:
+    return np.zeros_like(picture) if rng.random() < float(np.asarray(values["share"])) else picture
+
+
 def _value(name: str) -> Callable[[float, Random], Values]:
     return lambda strength, rng: {name: strength}
 
@@ -265,6 +278,30 @@ def _erring(entries: Sequence[str], reading: Reading, error: Reading) -> Reading
     return found
 
 
+# --- instructions -------------------------------------------------------------------------------
+
+
+def _wording(kind: str) -> Effect:
+    """Another text in place of the instruction."""
+
+    def change(text: str, values: Values, words: Words) -> str:
+        return worded(kind, round(float(np.asarray(values["text"]))), words)
+
+    return Effect(_value("text"), LANGUAGE, on_text=change)
+
+
+def _clauses(kind: str) -> Effect:
+    """Sentences around the instruction."""
+
+    def change(text: str, values: Values, words: Words) -> str:
+        number, key = (round(float(np.asarray(values[name]))) for name in ("clauses", "key"))
+        return extended(kind, number, key, text)
+
+    return Effect(
+        lambda strength, rng: {"clauses": strength, "key": int(rng.integers(2**31))}, LANGUAGE, on_text=change
+    )
+
+
 EFFECTS: Mapping[str, Effect] = {
     "light_direction": Effect(_flat_axis, on_model=_turn_light),
     "light_intensity": Effect(_brighter, on_model=_scale("diffuse", "head_ambient", "head_diffuse")),
@@ -282,11 +319,15 @@ EFFECTS: Mapping[str, Effect] = {
     "compression": Effect(_value("loss"), on_picture=_compress),
     "exposure": Effect(lambda strength, rng: {"factor": float(2.0 ** (_sign(rng) * strength))}, on_picture=_expose),
     "patch": Effect(lambda strength, rng: {"edge": strength, "at": rng.random(2).tolist()}, on_picture=_cover),
+    "dropped": Effect(_value("share"), on_picture=_drop, is_passing=True),
+    "late": Effect(_value("seconds"), is_late=True, is_passing=True),
     "proprioception_noise": Effect(_value("sigma"), PROPRIOCEPTION, on_reading=_noise),
     "proprioception_bias": Effect(
         lambda strength, rng: {"bias": strength, "key": int(rng.integers(2**31))}, PROPRIOCEPTION, on_reading=_bias
     ),
     "wrench_noise": Effect(_value("sigma"), WRENCH, on_reading=_noise),
     "object_noise": Effect(_value("sigma"), OBJECTS, on_reading=_noise),
+    **{kind: _wording(kind) for kind in WORDINGS},
+    **{kind: _clauses(kind) for kind in CLAUSES},
 }
 """What each kind does, by its name. `conf/perturbations` has a file for each, with its strengths."""

@@ -20,6 +20,7 @@ from ..samplers.task_files import conf_dir
 from ..work.plain import read_yaml
 from .effects import (
     EFFECTS,
+    LANGUAGE,
     OBJECTS,
     PICTURES,
     PROPRIOCEPTION,
@@ -30,11 +31,12 @@ from .effects import (
     Values,
     is_among,
 )
+from .language import WORDINGS, Words
 
 LEVELS = 5
 """Number of levels of each kind."""
-HEADLIGHT = ("ambient", "diffuse", "specular")
-"""Colours of the light at the camera."""
+HEADLIGHT = "vis_headlight_"
+"""Beginning of the names of the colours of the light at the camera."""
 NONE = "none"
 """Name of no perturbation."""
 
@@ -116,6 +118,8 @@ class Perturbation:
             if name in dict(parts):
                 raise BadConfig(f"perturb = {text}; {name} is in it twice: give each kind once")
             parts.append((name, int(level)))
+        if len(texts := [name for name, _ in parts if name in WORDINGS]) > 1:
+            raise BadConfig(f"perturb = {text}; {' and '.join(texts)} replace the same instruction: give one of them")
         return cls(tuple(parts))
 
     def __str__(self) -> str:
@@ -124,8 +128,13 @@ class Perturbation:
     def __bool__(self) -> bool:
         return bool(self.parts)
 
+    @property
+    def has_words(self) -> bool:
+        """Whether a part changes the instruction."""
+        return any(kinds()[name].effect.reads == LANGUAGE for name, _ in self.parts)
+
     def check(self, streams: Sequence[str], cameras: Sequence[str]) -> None:
-        """Raise `BadConfig` if a part affects nothing that is observed.
+        """Raise `BadConfig` if a part affects nothing that is observed. The instruction can always be read.
 
         Args:
             streams: names of the observed streams.
@@ -133,6 +142,8 @@ class Perturbation:
         """
         for name, level in self.parts:
             effect = kinds()[name].effect
+            if effect.reads == LANGUAGE:
+                continue
             if effect.reads == PICTURES:
                 seen = [camera for camera in cameras if affects(effect, camera)]
                 what = (
@@ -144,20 +155,20 @@ class Perturbation:
             if not seen:
                 raise BadConfig(f"perturb = {name}@{level} affects {what}")
 
-    def of(self, scenario: str, seed: int = 0, bodies: Iterable[str] = ()) -> "Drawn":
+    def of(self, scenario: str, seed: int = 0, bodies: Iterable[str] = (), words: Words | None = None) -> "Drawn":
         """What is drawn for a scenario.
 
         Args:
             scenario: its id.
             bodies: names of the bodies of its scene. Readings of others stay 0.
+            words: the instruction and others, for a part that changes it.
         """
         values = {}
         for name, level in self.parts:
             rng = _random("draw", name, scenario, seed)
             values[name] = kinds()[name].effect.draw(kinds()[name].strengths[level - 1], rng)
-        return Drawn(
-            self, scenario, seed, values, tuple(f"{start}{body}_" for body in bodies for start in ("", "seen_"))
-        )
+        starts = tuple(f"{start}{body}_" for body in bodies for start in ("", "seen_"))
+        return Drawn(self, scenario, seed, values, starts, words)
 
 
 @dataclass(frozen=True)
@@ -171,6 +182,8 @@ class Drawn:
     """Drawn values by kind."""
     starts: tuple[str, ...] = ()
     """Beginnings of the names of readings of bodies that the scene has."""
+    words: Words | None = None
+    """The instruction and others, for a part that changes it."""
 
     @cached_property
     def effects(self) -> Mapping[str, Effect]:
@@ -183,6 +196,25 @@ class Drawn:
             for name, values in self.values.items()
         }
 
+    @cached_property
+    def instruction(self) -> str | None:
+        """The instruction as it is given; None if it is the task's own. Wordings come before clauses."""
+        parts = [(name, effect.on_text) for name, effect in self.effects.items() if effect.on_text is not None]
+        if self.words is None or not parts:
+            return None
+        text = self.words.instruction
+        for name, change in sorted(parts, key=lambda part: part[0] not in WORDINGS):
+            text = change(text, self.values[name], self.words)
+        return text
+
+    @cached_property
+    def delay(self) -> float:
+        """Age of the pictures that are perceived [s]."""
+        return max(
+            (float(np.asarray(self.values[n]["seconds"])) for n, each in self.effects.items() if each.is_late),
+            default=0.0,
+        )
+
     def on_model(self, model: mujoco.MjModel) -> None:
         """Change lights, colours and cameras of a compiled scene, once."""
         for name, values in self.values.items():
@@ -192,16 +224,14 @@ class Drawn:
     def while_applied(self, model: mujoco.MjModel) -> Iterator[set[str]]:
         """Change a compiled scene as `on_model` during a `with` statement; the names of the arrays that differ then."""
         before = arrays(model)
-        light = {part: getattr(model.vis.headlight, part).copy() for part in HEADLIGHT}
         self.on_model(model)
         changed = {name for name, array in arrays(model).items() if array.tobytes() != before[name].tobytes()}
         try:
             yield changed
         finally:
             for name in changed:
-                getattr(model, name)[...] = before[name]
-            for part, value in light.items():
-                setattr(model.vis.headlight, part, value)
+                owner = model.vis.headlight if name.startswith(HEADLIGHT) else model
+                getattr(owner, name.removeprefix(HEADLIGHT))[...] = before[name]
 
     def on_picture(self, picture: Picture, camera: str, period: int) -> Picture:
         """A picture as it is perceived.
@@ -238,10 +268,34 @@ class Drawn:
         return _random("use", name, dict(self.perturbation.parts)[name], self.scenario, self.seed, what, period)
 
 
+class Late:
+    """Pictures that arrive late: of each camera the newest one that is old enough, or the first."""
+
+    def __init__(self, delay: float):
+        """
+        Args:
+            delay: age of what arrives [s].
+        """
+        self.delay = delay
+        self.taken: dict[str, list[tuple[float, Picture]]] = {}
+        """Time [s] and picture of what has been taken and may still arrive, by camera."""
+
+    def arriving(self, camera: str, time: float, picture: Picture) -> Picture:
+        """The picture that arrives when another one is taken."""
+        taken = [each for each in self.taken.get(camera, []) if each[0] < time]
+        taken.append((time, picture))
+        while len(taken) > 1 and taken[1][0] <= time - self.delay + 1e-9:
+            del taken[0]
+        self.taken[camera] = taken
+        return taken[0][1]
+
+
 def arrays(model: mujoco.MjModel) -> dict[str, NDArray[np.generic]]:
-    """Copies of all arrays of a compiled scene, by name."""
-    every = ((name, getattr(model, name)) for name in dir(model) if not name.startswith("_"))
-    return {name: array.copy() for name, array in every if isinstance(array, np.ndarray)}
+    """Copies of all arrays of a compiled scene, by name, and of the colours of its headlight."""
+    every = {name: getattr(model, name) for name in dir(model) if not name.startswith("_")}
+    light = model.vis.headlight
+    every |= {f"{HEADLIGHT}{part}": getattr(light, part) for part in ("ambient", "diffuse", "specular")}
+    return {name: array.copy() for name, array in every.items() if isinstance(array, np.ndarray)}
 
 
 def affects(effect: Effect, camera: str) -> bool:
