@@ -28,8 +28,9 @@ from ..episode import STRICT, Actions, Episode, Outcome, Rules, check_rules
 from ..errors import BadConfig, ScengenError, UnknownName, Unstable, cut
 from ..orientation import Orientation
 from ..params import Value
+from ..perturb.drawn import Senses
 from ..perturb.language import Words
-from ..perturb.perturbation import Late, Perturbation
+from ..perturb.perturbation import Perturbation
 from ..pictures.opengl import check_size
 from ..pictures.render import Camera
 from ..pool import PoolRow
@@ -349,7 +350,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             return made
         episode = (self._episode.outcome, self._episode.reason, self._episode.held, self._episode.lacks)
         entry = {"scenario": self._row.id, "world": self._world.state(), "episode": episode}
-        return {**made, **entry, "played": [*self._played], "late": self._late.taken}
+        return {**made, **entry, "played": [*self._played], "taken": self._senses.taken}
 
     def _continue(self, progress: Mapping[str, Any]) -> None:
         """Return to a `_progress()` of an environment with the same arguments."""
@@ -357,7 +358,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._load(self._rows[self._rows.find(progress["scenario"])])
             self.world.restore(progress["world"])
             self._played = [*progress["played"]]
-            self._late.taken = progress["late"]
+            self._senses.taken = progress["taken"]
             episode = self._episode
             episode.outcome, episode.reason, episode.held, episode.lacks = progress["episode"]
         self._next = progress["next"]
@@ -375,7 +376,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             if self._needs_pictures:
                 self.drawn.on_model(model)
         self._row = row
-        self._late = Late(self.drawn.delay)
+        self._senses = Senses(self.drawn)
         self._played: list[NDArray[np.float32]] = []
         self._world.reset()
         self._episode = Episode(self._scenario, self._world, row.horizon, self.rules)
@@ -431,24 +432,13 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _perceived(self, name: str, reading: NDArray[np.float64]) -> NDArray[np.float64]:
         """A reading of a stream under the perturbation, if there is one."""
-        return (
-            self.drawn.on_reading(name, self.metadata["names"][name], reading, self._period)
-            if self.perturbation
-            else reading
-        )
-
-    @property
-    def _period(self) -> int:
-        """Number of the control period."""
-        return round(self.world.time / Loop.PERIOD)
+        return self._senses.reading(name, self.metadata["names"][name], self.world.time, reading)
 
     def _picture(self, camera: str) -> NDArray[np.uint8]:
         if self._renderer is None:
             self._renderer = Camera(self.world, self.observed.width, self.observed.height)
         picture = self._scenario.orientation.apply(self._renderer.take(camera)).copy()
-        if self.drawn.delay:
-            picture = self._late.arriving(camera, self.world.time, picture)
-        return self.drawn.on_picture(picture, camera, self._period)
+        return self._senses.picture(camera, self.world.time, picture)
 
     def _info(self, reason: str, success: bool) -> dict[str, Any]:
         found = {"success": success, "is_success": success, "reason": reason, "lacks": self._episode.lacks}

@@ -14,8 +14,8 @@ from ..errors import BadConfig, UnknownName, cut
 from ..learn.store import is_policy, read_settings
 from ..perturb.perturbation import Perturbation
 from ..pool import collection
-from ..work.limits import at_least
 from ..work.foreign import is_factory
+from ..work.limits import at_least
 from ..work.parallel import Workers
 from .policies import FULL_RATE_POLICIES
 from .remote.client import INSTRUCTION, ClientSettings, address_of, is_address, read_client
@@ -133,7 +133,9 @@ class EvaluateSettings:
         check_filter(self.action_filter)
         check_rules(self.rules)
         if Perturbation.parse(self.perturb).has_words and not self._gets_text:
-            raise BadConfig(f"perturb = {self.perturb}; policy {self.name} gets no text: leave out what changes the text")
+            raise BadConfig(
+                f"perturb = {self.perturb}; policy {self.name} gets no text: leave out what changes the text"
+            )
         if self.splits not in SPLITS:
             raise UnknownName("splits", self.splits, SPLITS)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1, perturb_seed=0)

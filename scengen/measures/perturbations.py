@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..params import parameters
+from ..perturb.kinds import LEVELS, kinds
 from ..perturb.language import WORDINGS, Words
-from ..perturb.perturbation import LEVELS, kinds
 from ..samplers.split import ID
 from ..samplers.task import Task
 from ..validate.rebuilt import rebuild, world_of

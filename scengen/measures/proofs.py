@@ -11,9 +11,11 @@ from ..envs.object_state import ObjectState
 from ..envs.observations import Stream, cameras_of, privileged, streams_of
 from ..episode import Actions, Episode
 from ..orientation import Orientation
+from ..perturb.drawn import Drawn
 from ..perturb.effects import LANGUAGE, PICTURES
+from ..perturb.kinds import LEVELS, Kind, affects, stream_kind
 from ..perturb.language import Words, leaks, other_words
-from ..perturb.perturbation import LEVELS, Drawn, Kind, Perturbation, affects, stream_kind
+from ..perturb.perturbation import Perturbation
 from ..pictures.render import Camera, Picture, things
 from ..scenario import Scenario
 from ..sim.world import World
@@ -50,7 +52,7 @@ class Proof:
     neutral: bool
     """Whether the compiled scene differs only in what pictures alone use, and the witness ends in the same bits."""
     changes: Mapping[str, float]
-    """Largest change of each camera or stream that the kind affects, over the moments; share of other words of a text."""
+    """Largest change of each camera or stream that the kind affects, over the moments; or share of other words."""
     hidden: tuple[str, ...] = ()
     """Bodies that no camera keeps in sight at a moment at which clean pictures show them."""
     leaks: tuple[str, ...] = ()

@@ -66,6 +66,8 @@ class Effect:
     """Changes a reading, given the full names of its entries; the random numbers belong to its time and stream."""
     on_text: Callable[[str, Values, Words], str] | None = None
     """Changes the instruction."""
+    varies: bool = True
+    """Whether scenarios differ in what is drawn. The level alone decides else."""
     is_passing: bool = False
     """Whether it changes some pictures of an episode only, so that what it hides is seen again in the next ones."""
     is_late: bool = False
@@ -287,7 +289,7 @@ def _wording(kind: str) -> Effect:
     def change(text: str, values: Values, words: Words) -> str:
         return worded(kind, round(float(np.asarray(values["text"]))), words)
 
-    return Effect(_value("text"), LANGUAGE, on_text=change)
+    return Effect(_value("text"), LANGUAGE, on_text=change, varies=False)
 
 
 def _clauses(kind: str) -> Effect:
@@ -307,26 +309,26 @@ EFFECTS: Mapping[str, Effect] = {
     "light_intensity": Effect(_brighter, on_model=_scale("diffuse", "head_ambient", "head_diffuse")),
     "light_colour": Effect(_tint, on_model=_scale("diffuse", "head_ambient", "head_diffuse")),
     "ambient": Effect(_brighter, on_model=_scale("head_ambient")),
-    "shadow": Effect(lambda strength, rng: {"shift": strength}, on_model=_contrast),
+    "shadow": Effect(_value("shift"), on_model=_contrast, varies=False),
     "table_colour": Effect(_colour, on_model=_paint("table_top")),
     "floor_colour": Effect(_colour, cameras=FIXED, on_model=_paint("floor")),
     "camera_position": Effect(_shift, cameras=FIXED, on_model=_move_cameras(FIXED)),
     "camera_angle": Effect(_turn, cameras=FIXED, on_model=_move_cameras(FIXED)),
     "camera_fov": Effect(_zoom, on_model=_move_cameras(EVERY)),
     "wrist_camera": Effect(_knock, cameras=WRIST, on_model=_move_cameras(WRIST)),
-    "noise": Effect(_value("sigma"), on_picture=_grain),
-    "blur": Effect(_value("sigma"), on_picture=_blur),
-    "compression": Effect(_value("loss"), on_picture=_compress),
+    "noise": Effect(_value("sigma"), on_picture=_grain, varies=False),
+    "blur": Effect(_value("sigma"), on_picture=_blur, varies=False),
+    "compression": Effect(_value("loss"), on_picture=_compress, varies=False),
     "exposure": Effect(lambda strength, rng: {"factor": float(2.0 ** (_sign(rng) * strength))}, on_picture=_expose),
     "patch": Effect(lambda strength, rng: {"edge": strength, "at": rng.random(2).tolist()}, on_picture=_cover),
-    "dropped": Effect(_value("share"), on_picture=_drop, is_passing=True),
-    "late": Effect(_value("seconds"), is_late=True, is_passing=True),
-    "proprioception_noise": Effect(_value("sigma"), PROPRIOCEPTION, on_reading=_noise),
+    "dropped": Effect(_value("share"), on_picture=_drop, varies=False, is_passing=True),
+    "late": Effect(_value("seconds"), is_late=True, varies=False, is_passing=True),
+    "proprioception_noise": Effect(_value("sigma"), PROPRIOCEPTION, on_reading=_noise, varies=False),
     "proprioception_bias": Effect(
         lambda strength, rng: {"bias": strength, "key": int(rng.integers(2**31))}, PROPRIOCEPTION, on_reading=_bias
     ),
-    "wrench_noise": Effect(_value("sigma"), WRENCH, on_reading=_noise),
-    "object_noise": Effect(_value("sigma"), OBJECTS, on_reading=_noise),
+    "wrench_noise": Effect(_value("sigma"), WRENCH, on_reading=_noise, varies=False),
+    "object_noise": Effect(_value("sigma"), OBJECTS, on_reading=_noise, varies=False),
     **{kind: _wording(kind) for kind in WORDINGS},
     **{kind: _clauses(kind) for kind in CLAUSES},
 }

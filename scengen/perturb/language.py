@@ -80,7 +80,9 @@ def worded(kind: str, number: int, words: Words) -> str:
         BadConfig: the task has none.
     """
     if not words.wordings:
-        raise BadConfig(f"{kind}: the task has no other wordings; write {', '.join(WORDINGS)} to conf/language/TASK.yaml")
+        raise BadConfig(
+            f"{kind}: the task has no other wordings; write {', '.join(WORDINGS)} to conf/language/TASK.yaml"
+        )
     return words.wordings[kind][number - 1]
 
 

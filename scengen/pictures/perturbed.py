@@ -6,7 +6,8 @@ from contextlib import closing
 import numpy as np
 
 from ..perturb.effects import PICTURES
-from ..perturb.perturbation import LEVELS, Kind, Perturbation, affects
+from ..perturb.kinds import LEVELS, Kind, affects
+from ..perturb.perturbation import Perturbation
 from ..pool import PoolRow
 from ..scenario import Scenario
 from ..validate.playable import stored_world

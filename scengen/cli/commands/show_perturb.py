@@ -6,7 +6,8 @@ from pathlib import Path
 from ...envs.observations import cameras_of
 from ...errors import BadConfig, UnknownName
 from ...ood.analysis.redraw import task_of
-from ...perturb.perturbation import Perturbation, kind_of, kinds
+from ...perturb.kinds import kind_of, kinds
+from ...perturb.perturbation import Perturbation
 from ...pictures.perturbed import sheet
 from ...pictures.render import check_pictures, encode
 from ...runs.progress import ProgressBar

@@ -1,0 +1,164 @@
+"""What is drawn for a scenario, and how it is applied to the compiled scene, pictures, readings and the instruction."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..control.loop import Loop
+from ..samplers.keyed import unit
+from .effects import OBJECTS, Effect, Picture, Reading, Values
+from .kinds import affects, kinds, stream_kind
+from .language import WORDINGS, Words
+
+HEADLIGHT = "vis_headlight_"
+"""Beginning of the names of the colours of the light at the camera."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A perturbation of one scenario."""
+
+    scenario: str
+    """Its id."""
+    seed: int
+    levels: Mapping[str, int]
+    """Level by kind."""
+    values: Mapping[str, Values]
+    """Drawn values by kind."""
+    starts: tuple[str, ...] = ()
+    """Beginnings of the names of readings of bodies that the scene has."""
+    words: Words | None = None
+    """The instruction and others, for a part that changes it."""
+
+    @cached_property
+    def effects(self) -> Mapping[str, Effect]:
+        return {name: kinds()[name].effect for name in self.values}
+
+    def plain(self) -> dict[str, dict[str, float | list[float]]]:
+        """The values as plain data."""
+        return {
+            name: {key: list(value) if isinstance(value, Sequence) else value for key, value in values.items()}
+            for name, values in self.values.items()
+        }
+
+    @cached_property
+    def instruction(self) -> str | None:
+        """The instruction as it is given; None if it is the task's own. Wordings come before clauses."""
+        parts = [(name, effect.on_text) for name, effect in self.effects.items() if effect.on_text is not None]
+        if self.words is None or not parts:
+            return None
+        text = self.words.instruction
+        for name, change in sorted(parts, key=lambda part: part[0] not in WORDINGS):
+            text = change(text, self.values[name], self.words)
+        return text
+
+    @cached_property
+    def delay(self) -> float:
+        """Age of the pictures that are perceived [s]."""
+        return max(
+            (float(np.asarray(self.values[n]["seconds"])) for n, each in self.effects.items() if each.is_late),
+            default=0.0,
+        )
+
+    def on_model(self, model: mujoco.MjModel) -> None:
+        """Change lights, colours and cameras of a compiled scene, once."""
+        for name, values in self.values.items():
+            self.effects[name].on_model(model, values)
+
+    @contextmanager
+    def while_applied(self, model: mujoco.MjModel) -> Iterator[set[str]]:
+        """Change a compiled scene as `on_model` during a `with` statement; the names of the arrays that differ then."""
+        before = arrays(model)
+        self.on_model(model)
+        changed = {name for name, array in arrays(model).items() if array.tobytes() != before[name].tobytes()}
+        try:
+            yield changed
+        finally:
+            for name in changed:
+                owner = model.vis.headlight if name.startswith(HEADLIGHT) else model
+                getattr(owner, name.removeprefix(HEADLIGHT))[...] = before[name]
+
+    def on_picture(self, picture: Picture, camera: str, period: int) -> Picture:
+        """A picture as it is perceived.
+
+        Args:
+            camera: name of the camera.
+            period: number of the control period.
+        """
+        for name, values in self.values.items():
+            effect = self.effects[name]
+            if effect.on_picture is not None and affects(effect, camera):
+                picture = effect.on_picture(picture, values, self._rng(name, camera, period))
+        return picture
+
+    def on_reading(self, stream: str, entries: Sequence[str], reading: Reading, period: int) -> Reading:
+        """A reading of a stream as it is perceived.
+
+        Args:
+            entries: full names of its entries.
+            period: number of the control period.
+        """
+        for name, values in self.values.items():
+            effect = self.effects[name]
+            if effect.on_reading is not None and stream_kind(stream) == effect.reads:
+                found = effect.on_reading(entries, reading, values, self._rng(name, stream, period))
+                reading = np.where(self._there(entries), found, reading) if effect.reads == OBJECTS else found
+        return reading
+
+    def _there(self, entries: Sequence[str]) -> NDArray[np.bool_]:
+        """Whether the scene has the body of each entry."""
+        return np.array([entry.startswith(self.starts) for entry in entries])
+
+    def _rng(self, name: str, what: str, period: int) -> np.random.Generator:
+        return random("use", name, self.levels[name], self.scenario, self.seed, what, period)
+
+
+class Senses:
+    """What is perceived in an episode: its pictures and readings under a perturbation."""
+
+    def __init__(self, drawn: Drawn):
+        self.drawn = drawn
+        self.taken: dict[str, list[tuple[float, Picture]]] = {}
+        """Time [s] and picture of what has been taken and may still arrive, by camera."""
+
+    def picture(self, camera: str, time: float, picture: Picture) -> Picture:
+        """What arrives when a picture is taken: of a late camera the newest that is old enough, or the first.
+
+        Args:
+            camera: robosuite's name.
+            time: time of the simulation [s].
+        """
+        if self.drawn.delay:
+            taken = [each for each in self.taken.get(camera, []) if each[0] < time]
+            taken.append((time, picture))
+            while len(taken) > 1 and taken[1][0] <= time - self.drawn.delay + 1e-9:
+                del taken[0]
+            self.taken[camera], picture = taken, taken[0][1]
+        return self.drawn.on_picture(picture, camera, _period(time))
+
+    def reading(self, stream: str, entries: Sequence[str], time: float, reading: Reading) -> Reading:
+        """What is read of a stream, given the full names of its entries and the time of the simulation [s]."""
+        return self.drawn.on_reading(stream, entries, reading, _period(time)) if self.drawn.values else reading
+
+
+def _period(time: float) -> int:
+    """Number of the control period at a time."""
+    return round(time / Loop.PERIOD)
+
+
+def arrays(model: mujoco.MjModel) -> dict[str, NDArray[np.generic]]:
+    """Copies of all arrays of a compiled scene, by name, and of the colours of its headlight."""
+    every = {name: getattr(model, name) for name in dir(model) if not name.startswith("_")}
+    light = model.vis.headlight
+    every |= {f"{HEADLIGHT}{part}": getattr(light, part) for part in ("ambient", "diffuse", "specular")}
+    return {name: array.copy() for name, array in every.items() if isinstance(array, np.ndarray)}
+
+
+def random(*key: str | int) -> np.random.Generator:
+    """Random numbers that depend on a key alone."""
+    return np.random.default_rng(int(unit("perturb", *key) * 2**53))
