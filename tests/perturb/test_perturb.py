@@ -182,7 +182,7 @@ def test_sound_kinds_are_proved(stage, name, level):
 
 def planted(monkeypatch, name, **parts):
     """A kind with a fault in its effect."""
-    monkeypatch.setattr(kinds_module, "EFFECTS", {**EFFECTS, name: replace(EFFECTS[name], **parts)})
+    monkeypatch.setattr("scengen.perturb.kinds.EFFECTS", {**EFFECTS, name: replace(EFFECTS[name], **parts)})
     return kinds()[name]
 
 
