@@ -10,6 +10,7 @@ from ..control.loop import Loop
 from ..envs.object_state import ObjectState
 from ..envs.observations import Stream, cameras_of, privileged, streams_of
 from ..episode import Actions, Episode
+from ..look.looks import ROOM
 from ..orientation import Orientation
 from ..perturb.effects import PICTURES
 from ..perturb.perturbation import LEVELS, Drawn, Kind, Perturbation, affects, stream_kind
@@ -68,7 +69,7 @@ class Stage:
 
     def __init__(self, scenario: Scenario, scene_xml: str, embodiment: str, witness: Actions):
         self.scenario, self.scene_xml, self.embodiment, self.witness = scenario, scene_xml, embodiment, witness
-        self.world = World.load(scene_xml, embodiment, visual=True)
+        self.world = World.load(scene_xml, embodiment, ROOM)
         self.cameras = cameras_of(embodiment)
         self.streams: dict[str, Stream] = streams_of(embodiment)
         self.eye = Camera(self.world, SIZE, SIZE)

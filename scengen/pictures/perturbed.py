@@ -5,6 +5,7 @@ from contextlib import closing
 
 import numpy as np
 
+from ..look.looks import ROOM
 from ..perturb.effects import PICTURES
 from ..perturb.perturbation import LEVELS, Kind, Perturbation, affects
 from ..pool import PoolRow
@@ -32,7 +33,7 @@ def sheet(
     """
     shown = [kind for kind in kinds if kind.effect.reads == PICTURES and affects(kind.effect, camera)]
     levels = [Perturbation(((kind.name, level),)) for kind in shown for level in range(1, LEVELS + 1)]
-    pictures, world = list[Picture](), stored_world(row, visual=True)
+    pictures, world = list[Picture](), stored_world(row, ROOM)
     with closing(Camera(world, size, size)) as eye:
 
         def taken() -> Picture:

@@ -21,6 +21,7 @@ from PIL import Image
 from ..assets.prop import TABLE_TOP
 from ..errors import ScengenError, UnknownName
 from ..geometry import Vec3
+from ..look.looks import ROOM, Look, look_of
 from ..robots.panda import arms
 from ..sim.world import World
 from ..work.machine import free_address_space
@@ -31,9 +32,6 @@ Picture = NDArray[np.uint8]
 State = NDArray[np.float64]
 """State of a world, see `World.state`."""
 
-SHADOW_MAP_SIZE = 1024
-"""Edge of the shadow map [pixels]. MuJoCo's 4096 gives almost the same picture, which takes 1.6 times as long without a
-graphics card."""
 MIN_ADDRESS_SPACE = 2.5e9
 """Address space that a process needs for its first picture [bytes]: OpenGL in software takes 2.2 GB, most of it for the
 stacks of its threads."""
@@ -64,9 +62,10 @@ class Camera:
         opengl.check_size(width=width, height=height)
         self.world, self._lock = world, threading.Lock()
         check_pictures()
-        world.model.vis.quality.shadowsize = SHADOW_MAP_SIZE
+        look = look_of(world.model)
+        world.model.vis.quality.shadowsize = look.shadow_map_of(width, height)
         try:
-            self._renderer = opengl.Renderer(world.model, height, width)
+            self._renderer = opengl.Renderer(world.model, height, width, look.smooth_shadows)
         except Exception as error:  # its type depends on platform and back end: ImportError, AttributeError, GLError
             raise NoPictures(
                 f"no OpenGL for pictures ({' '.join(str(error).split())[:80]}); on Debian install libegl1 libgl1 "
@@ -286,14 +285,14 @@ def check_pictures() -> None:
 
 
 @contextmanager
-def camera(scene_xml: str, embodiment: str, width: int = 320, height: int = 240) -> Iterator[Camera]:
+def camera(scene_xml: str, embodiment: str, width: int = 320, height: int = 240, look: Look = ROOM) -> Iterator[Camera]:
     """A camera at the start of a scene, with the robot's visual meshes; see `Camera`.
 
     Raises:
         NoPictures: OpenGL is missing.
     """
     check_pictures()  # before the meshes of the robot, which take a part of the address space
-    view = Camera(World.load(scene_xml, embodiment, visual=True), width, height)
+    view = Camera(World.load(scene_xml, embodiment, look), width, height)
     try:
         yield view
     finally:

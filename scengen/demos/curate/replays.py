@@ -177,7 +177,7 @@ def _replayed(recorded: Recorded) -> Replayed:
     scenario, robot = task.scenario(recorded.params), task.embodiment
     text = rebuild(scenario)
     labels = tuple(wrong_labels(recorded.told, task, scenario, text))
-    found = _played(recorded, scenario, World.load(text, robot, visual=bool(recorded.films)), text)
+    found = _played(recorded, scenario, World.load(text, robot, recorded.look if recorded.films else None), text)
     return replace(found, findings=(*labels, *found.findings))
 
 
