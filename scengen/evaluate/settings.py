@@ -12,6 +12,7 @@ from ..envs.vector import MAX_SLOTS
 from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName, cut
 from ..learn.store import is_policy, read_settings
+from ..look.looks import ROOM, look_named
 from ..perturb.perturbation import Perturbation
 from ..pool import collection
 from ..work.limits import at_least
@@ -58,6 +59,7 @@ class EvaluateSettings:
     keep: list[str] = field(default_factory=list)
     perturb: str | None = None
     perturb_seed: int = 0
+    look: str = ROOM.name
 
     @cached_property
     def folders(self) -> list[str]:
@@ -125,6 +127,7 @@ class EvaluateSettings:
         check_filter(self.action_filter)
         check_rules(self.rules)
         Perturbation.parse(self.perturb)
+        look_named(self.look)
         if self.splits not in SPLITS:
             raise UnknownName("splits", self.splits, SPLITS)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1, perturb_seed=0)

@@ -43,14 +43,23 @@ class Finish:
 
 
 WOOD = Finish("look_wood", 0.15, 0.4, 0.0, textures.grain, 0.25)
+"""Oiled wood."""
 STEEL = Finish("look_steel", 0.6, 0.6)
+"""Brushed metal."""
 CERAMIC = Finish("look_ceramic", 0.5, 0.8)
+"""Glazed ceramic."""
 CARD = Finish("look_card", 0.05, 0.1, 0.0, textures.fibres, 0.15)
+"""Cardboard."""
 MAT = Finish("look_mat", 0.0, 0.0, 0.12, textures.weave)
-PRINT = Finish("look_print")
+"""Woven mat with a hem. A little light of its own keeps its colour in the shade of a hand."""
 MARKED = Finish("look_marked", 0.0, 0.0, 0.08, textures.outline)
+"""Square with an outline, which has a little light of its own."""
+PRINT = Finish("look_print")
+"""Ink and paper."""
 GLASS = Finish("look_glass", 0.8, 0.9)
+"""Clear plastic."""
 VARNISH = Finish("look_varnish", 0.3, 0.5)
+"""Varnished paint, for all other things."""
 
 OF_PARTS = {
     **dict.fromkeys(("bottom", "wall", "rim", "shell", "bead", "lip", "skin"), CERAMIC),
@@ -90,8 +99,6 @@ OF_COLOURS = {
     (0.75, 0.16, 0.14): CARD,  # CrackerBox
 }
 """Finish of things, by the colours that assets give them."""
-FINISHES = (WOOD, STEEL, CERAMIC, CARD, MAT, MARKED, PRINT, GLASS, VARNISH)
-"""All finishes of things."""
 
 
 def finish_of(geom: mujoco.MjsGeom) -> Finish:
@@ -99,7 +106,7 @@ def finish_of(geom: mujoco.MjsGeom) -> Finish:
     if geom.rgba[3] < 1.0:
         return GLASS
     part = re.sub(r"(_[-\d.A-Z]+)+$", "", geom.name.rpartition("/")[2])
-    colour = tuple(round(float(each), 2) for each in geom.rgba[:3])
+    red, green, blue = (round(float(each), 2) for each in geom.rgba[:3])
     if part in OF_PARTS and (OF_PARTS[part] is not CERAMIC or geom.type == mujoco.mjtGeom.mjGEOM_MESH):
         return OF_PARTS[part]
-    return OF_COLOURS.get(colour, VARNISH)
+    return OF_COLOURS.get((red, green, blue), VARNISH)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import mujoco
 
-from ..errors import UnknownName
+from ..errors import BadConfig, UnknownName, cut
 from . import room
 
 MARK = "scengen_look"
@@ -61,6 +61,20 @@ def look_named(name: str) -> Look:
     if name not in LOOKS:
         raise UnknownName("look", name, LOOKS)
     return LOOKS[name]
+
+
+def look_told(text: object) -> Look:
+    """The look that a recording names, by its name and version; `PLAIN` if it names none.
+
+    Raises:
+        BadConfig: there is no such look, or it has another version now.
+    """
+    if text is None:
+        return PLAIN
+    for look in LOOKS.values():
+        if text == str(look):
+            return look
+    raise BadConfig(f"look = {cut(repr(text))}; known are {', '.join(map(str, LOOKS.values()))}")
 
 
 def look_of(model: mujoco.MjModel) -> Look:

@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 
-from ..look.looks import ROOM
+from ..look.looks import Look
 from ..perturb.effects import PICTURES
 from ..perturb.perturbation import LEVELS, Kind, Perturbation, affects
 from ..pool import PoolRow
@@ -20,6 +20,7 @@ def sheet(
     scenario: Scenario,
     kinds: Sequence[Kind],
     camera: str,
+    look: Look,
     size: int,
     seed: int,
     progress: Progress = lambda done, total: None,
@@ -28,12 +29,13 @@ def sheet(
 
     Args:
         camera: robosuite's name of the camera.
+        look: look of the pictures.
         size: width and height of each picture [pixels].
         seed: seed of the perturbations.
     """
     shown = [kind for kind in kinds if kind.effect.reads == PICTURES and affects(kind.effect, camera)]
     levels = [Perturbation(((kind.name, level),)) for kind in shown for level in range(1, LEVELS + 1)]
-    pictures, world = list[Picture](), stored_world(row, ROOM)
+    pictures, world = list[Picture](), stored_world(row, look)
     with closing(Camera(world, size, size)) as eye:
 
         def taken() -> Picture:
