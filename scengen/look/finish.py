@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
 from . import textures
 
@@ -39,7 +40,7 @@ class Finish:
             added = spec.add_texture(name=self.name, type=kind, width=width, height=height, nchannel=channels)
             added.data = image.tobytes()
             made.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = self.name
-            made.texuniform, made.texrepeat = self.edge is not None, [1.0 / (self.edge or 1.0)] * 2
+            made.texuniform, made.texrepeat = self.edge is not None, np.full(2, 1.0 / (self.edge or 1.0), np.float32)
 
 
 WOOD = Finish("look_wood", 0.15, 0.4, 0.0, textures.grain, 0.25)

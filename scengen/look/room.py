@@ -131,9 +131,9 @@ def _light(spec: mujoco.MjSpec) -> None:
             spec.delete(texture)
 
 
-def _add_lamp(spec: mujoco.MjSpec, place: ArrayLike, light: ArrayLike, cone: float) -> mujoco.MjsLight:
+def _add_lamp(spec: mujoco.MjSpec, place: tuple[float, float, float], light: ArrayLike, cone: float) -> mujoco.MjsLight:
     """Add a lamp that aims at the table, without shadows or highlights."""
     lamp = spec.worldbody.add_light(castshadow=False, cutoff=cone, exponent=0.0)
-    lamp.pos, lamp.dir = np.asarray(place, float), AIM - place
+    lamp.pos, lamp.dir = np.array(place), AIM - np.array(place)
     lamp.diffuse, lamp.specular = np.array(light, np.float32), np.zeros(3, np.float32)
     return lamp

@@ -97,18 +97,21 @@ class Camera:
             self._renderer.update_scene(data, camera=name or self._view, scene_option=self._options)
             return self._renderer.render()
 
-    def bodies(self, name: str) -> NDArray[np.int32]:
-        """Number of the body that each pixel of a named camera shows, shape (height, width); -1 for none."""
-        model, data = self.world.model, self.world.data
+    def geoms(self, name: str | None = None) -> NDArray[np.int32]:
+        """Number of the geom that each pixel shows, shape (height, width); -1 for none. Cameras as in `take`."""
         with self._lock:
             self._renderer.enable_segmentation_rendering()
             try:
-                self._renderer.update_scene(data, camera=name, scene_option=self._options)
+                self._renderer.update_scene(self.world.data, camera=name or self._view, scene_option=self._options)
                 shown = self._renderer.render()
             finally:
                 self._renderer.disable_segmentation_rendering()
-        geoms = (shown[..., 1] == mujoco.mjtObj.mjOBJ_GEOM) & (shown[..., 0] >= 0)
-        return np.where(geoms, model.geom_bodyid[np.where(geoms, shown[..., 0], 0)], -1)
+        return np.where(shown[..., 1] == mujoco.mjtObj.mjOBJ_GEOM, shown[..., 0], -1)
+
+    def bodies(self, name: str | None = None) -> NDArray[np.int32]:
+        """Number of the body that each pixel shows, shape (height, width); -1 for none. Cameras as in `take`."""
+        geoms = self.geoms(name)
+        return np.where(geoms >= 0, self.world.model.geom_bodyid[geoms], -1)
 
     def look_by(self, view: MjvCamera) -> None:
         """Choose a view."""
