@@ -19,7 +19,7 @@ FLOOR = Finish("look_floor", 0.05, 0.2, 0.0, textures.slabs, 1.2)
 """Finish of the floor."""
 PLASTER = Finish("look_plaster")
 """Finish of the walls."""
-TABLE_COLOUR: Rgba = (0.69, 0.62, 0.55, 1.0)
+TABLE_COLOUR: Rgba = (0.62, 0.555, 0.49, 1.0)
 """Lightest colour of the table: darker than ivory tiles and birch, lighter than steel, greyer than wooden things."""
 FLOOR_COLOUR: Rgba = (0.50, 0.51, 0.53, 1.0)
 """Lightest colour of the floor."""
@@ -43,13 +43,13 @@ AIM = np.array([0.0, 0.0, 0.8])
 """Place at which lights aim: the middle of the table [m]."""
 KEY_PLACE = (1.0, -1.2, 3.2)
 """Place of the key light [m]: from there the arm throws its shadow away from cameras in front of the table."""
-KEY_LIGHT = (0.50, 0.49, 0.47)
+KEY_LIGHT = (0.45, 0.44, 0.42)
 """Light of the key: warm, and less than half of all light, so that shadows are not black."""
 KEY_HIGHLIGHT = 0.6
 """Light of the key for highlights. They show what is glossy; a stronger one bleaches colours."""
-FILLS = (((-1.0, 1.8, 2.4), 0.14), ((1.8, 1.4, 2.2), 0.12))
+FILLS = (((-1.0, 1.8, 2.4), 0.14), ((2.4, 0.8, 1.5), 0.18))
 """Place [m] and light of each fill, on the other sides. Fills throw no shadows: each would cost as much as the key."""
-AMBIENT = 0.38
+AMBIENT = 0.42
 """Light from everywhere."""
 HEADLIGHT = 0.08
 """Light from the camera."""
