@@ -13,7 +13,7 @@ LAYERS = (
     ("errors", "geometry", "installation", "compat", "certificate"),
     ("decisions", "html_tables", "orientation", "params", "physics", "symmetry"),
     ("robots",),
-    ("control",),
+    ("control", "look"),
     ("sim",),
     ("assets", "means"),
     ("predicates", "scenario"),
@@ -35,7 +35,7 @@ LAYERS = (
 """Packages and modules of scengen from the ground up. Those of one line must not import each other."""
 WINGS = {
     "core": """errors geometry installation compat decisions html_tables orientation params physics symmetry robots
-        control sim assets means predicates scenario episode skills samplers tasks work compose perturb""",
+        control look sim assets means predicates scenario episode skills samplers tasks work compose perturb""",
     "proof": "certificate validate attack evidence conformance measures",
     "data": "pool runs demos export intake",
     "study": "learn evaluate ood agents bench drift",

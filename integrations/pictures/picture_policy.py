@@ -22,6 +22,7 @@ from scengen.compose import load_task
 from scengen.envs.observations import cameras_of, streams_of
 from scengen.export.replay import Snapshot, WitnessReplay
 from scengen.export.sources import open_source
+from scengen.look.looks import ROOM
 from scengen.pictures.render import Camera
 from scengen.validate.playable import stored_world
 
@@ -55,7 +56,7 @@ def _collect(demonstrations: str, to: str, first: int, step: int) -> None:
     for number, row in enumerate(open_source(demonstrations).rows()):
         if number % step != first:
             continue
-        world, scenario = stored_world(row, True), load_task(row.task).scenario(row.params)
+        world, scenario = stored_world(row, ROOM), load_task(row.task).scenario(row.params)
         camera, views = Camera(world, SIZE, SIZE), cameras_of(row.embodiment)
         streams = {name: streams_of(row.embodiment)[name] for name in POSE}
 
@@ -162,7 +163,9 @@ def train(frames: str, weights: str, minutes: str = "5") -> None:
             network.train()
             print(f"step {step}: loss {float(loss.detach()):.4f}, held out {apart:.4f}", flush=True)
     pose_scale = torch.from_numpy(np.stack([mean, spread]))
-    torch.save({"network": network.state_dict(), "pose": pose_scale, "actions": acts.shape[1]}, weights)
+    torch.save(
+        {"network": network.state_dict(), "pose": pose_scale, "actions": acts.shape[1], "look": str(ROOM)}, weights
+    )
     print(f"{step} steps on {len(rows)} rows in {weights}")
 
 
@@ -176,6 +179,7 @@ class Policy:
         self.network = Network(stored["actions"]).to(self.device).eval()
         self.network.load_state_dict(stored["network"])
         self.mean, self.spread = stored["pose"].cpu().numpy()
+        self.look = stored["look"]
         self.version = f"{Path(weights).stat().st_size} {Path(weights).stat().st_mtime_ns}"
 
     def reset(self, observation, info, seed) -> None:

@@ -10,7 +10,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import mujoco
@@ -32,6 +32,7 @@ from ..validate.playable import stored_world
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from ..validate.settings import QUICK
+from .look_cost import look_ratios
 from .quiet import disturbance, scheduled
 from .timing import SLICE, Measure, Promise, Side, alternated, ratio, step_with
 from .vector_speed import vector_ratios
@@ -68,6 +69,10 @@ PROMISES = {
     "vector_to_async": Promise(
         3.0, "at least", "steps in a second of 16 slots, one thread a core / of AsyncVectorEnv with 16 processes"
     ),
+    "room_picture_to_plain": Promise(1.4, "at most", "a picture of 256 x 256 pixels in the room / in the plain look"),
+    "room_start_to_plain": Promise(
+        1.5, "at most", "a scenario's text to its first picture, in the room / in the plain look"
+    ),
     "env_reset_ms": Promise(20.0, "at most", "the Gymnasium environment's reset of a loaded scenario (ms)"),
 }
 """Promised limits, by measure."""
@@ -77,8 +82,8 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any], str]:
     """Measure everything `repeats` times and take the medians of the ratios.
 
     Returns:
-        Tables, the result, and why the machine was not quiet; an empty text if it was. Measures of robosuite are
-        missing where it is not installed.
+        Tables, the result, and why the machine was not quiet; an empty text if it was. Measures of robosuite and of
+        pictures are missing where it, or OpenGL, is not installed.
     """
     load, begin = os.getloadavg()[0], scheduled()
     found = {
@@ -89,7 +94,10 @@ def bench(repeats: int) -> tuple[list[Table], dict[str, Any], str]:
         **gym_costs(repeats),
     }
     with _pool() as pool:
-        found |= vector_ratios(str(pool.folder), next(pool.rows()), repeats)
+        row = next(pool.rows())
+        found |= vector_ratios(str(pool.folder), row, repeats)
+        with suppress(NoPictures):
+            found |= look_ratios(row, repeats)
     ran, waited = (now - before for now, before in zip(scheduled(), begin, strict=True))
     table = Table("measure", "median", "spread", "limit", "what", title="bench", title_justify="left")
     for name, measure in found.items():

@@ -52,10 +52,15 @@ Side = Callable[[], Iterator[None]]
 """Starts one side of a comparison, which yields after each slice of its work."""
 
 
-def alternated(sides: Sequence[Side], repeats: int) -> list[tuple[float, ...]]:
+def alternated(
+    sides: Sequence[Side], repeats: int, clock: Callable[[], float] = time.thread_time
+) -> list[tuple[float, ...]]:
     """Processor time of each side in each repetition [s]. The sides work in turn, a slice each.
 
     A first repetition, which compiles code and fills caches, does not count.
+
+    Args:
+        clock: processor time of this thread, or `time.process_time` for work that OpenGL does in threads of its own.
     """
     found = []
     for _ in range(repeats + 1):
@@ -63,10 +68,10 @@ def alternated(sides: Sequence[Side], repeats: int) -> list[tuple[float, ...]]:
         going = list(range(len(sides)))
         while going:
             for number in list(going):
-                start = time.thread_time()
+                start = clock()
                 if next(running[number], _END) is _END:
                     going.remove(number)
-                spent[number] += time.thread_time() - start
+                spent[number] += clock() - start
         found.append(tuple(spent))
     return found[1:]
 

@@ -26,6 +26,7 @@ from ..control.loop import Loop
 from ..control.teleop import check_filter, unfiltered
 from ..episode import STRICT, Actions, Episode, Outcome, Rules, check_rules
 from ..errors import BadConfig, ScengenError, UnknownName, Unstable, cut
+from ..look.looks import ROOM, look_named
 from ..orientation import Orientation
 from ..params import Value
 from ..perturb.drawn import Senses
@@ -147,6 +148,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         rules: Rules = STRICT,
         perturb: str | None = None,
         perturb_seed: int = 0,
+        look: str = ROOM.name,
     ):
         """Open the pools.
 
@@ -174,6 +176,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             perturb: kinds of perturbation at their levels, such as `light_direction@3+noise@1` (docs/perturb.md). The
                 physics stays as it is. The label `perturb` of `info` holds what was drawn.
             perturb_seed: another number draws other perturbations for the same scenarios.
+            look: look of pictures: `room`, or `plain`, the scene in a void (docs/perturb.md).
 
         Raises:
             ScengenError: a pool is missing, damaged, of another version or task; a name is unknown; pictures that are
@@ -189,6 +192,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.action_filter, self.settle, self.action_repeat = action_filter, settle, action_repeat
         self.rules: Rules = rules
         self.perturbation, self._perturb_seed, self._search = Perturbation.parse(perturb), perturb_seed, search
+        self.look = look_named(look)
         self.task: Task = compose.load_task(task, search)
         rows = rows_of(pool, task)
         self._arguments["pool"] = located(pool)
@@ -367,7 +371,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _load(self, row: PoolRow) -> None:
         if self._world is None or row.id != self._row.id:
             self.close()
-            self._world = stored_world(row, self._needs_pictures)
+            self._world = stored_world(row, self.look if self._needs_pictures else None)
             self._scenario = self.task.scenario(row.params)
             model = self._world.model
             bodies = [model.body(number).name for number in range(model.nbody)] if self.perturbation else ()

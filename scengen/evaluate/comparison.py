@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
+from ..look.looks import look_named
 from .edition import Edition
 from .rollouts import Evaluation
 from .settings import EvaluateSettings
@@ -118,6 +119,7 @@ class PolicyResult:
             "task_versions": self.task_versions,
             "edition": settings.edition and edition_told(settings.edition),
             "settle": settings.settle,
+            "look": str(look_named(settings.look)),
             "perturb": settings.perturb,
             "perturb_seed": settings.perturb_seed,
             "headline": self.headline,

@@ -170,6 +170,7 @@ class PolicyPlayer:
                 settle=settings.settle,
                 perturb=settings.perturb,
                 perturb_seed=settings.perturb_seed,
+                look=settings.look,
                 search=self.search,
             )
             memory = _training(folders) if settings.name == REPLAY else None

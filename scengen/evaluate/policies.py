@@ -9,6 +9,7 @@ of all slots at once.
 import hashlib
 import inspect
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
@@ -196,6 +197,8 @@ def make_policy(name: str, factory: Factory, env: PoolEnv) -> Policy:
     if missing := [method for method in ("reset", "act") if not callable(getattr(policy, method, None))]:
         what = f"returned {type(policy).__name__}, which has no method {' and no '.join(missing)}"
         raise BadConfig(f"policy = {cut(name)}; its factory {what}; see the class Policy in scengen.evaluate.policies")
+    if env.cameras and (trained := getattr(policy, "look", None)) not in (None, str(env.look)):
+        warnings.warn(f"{cut(name)} was trained with look {cut(str(trained))} and now sees {env.look}", stacklevel=2)
     return policy
 
 

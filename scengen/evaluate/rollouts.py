@@ -14,6 +14,7 @@ from typing import Any
 from ..compose import load_task
 from ..episode import Actions
 from ..errors import BadConfig, PoolError
+from ..look.looks import look_named
 from ..pool import Pool, kinds
 from ..samplers.split import ID
 from ..samplers.task_files import about as about_task
@@ -196,7 +197,7 @@ def _crashed(which: RolloutId, reason: str) -> dict[str, Any]:
 def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, Any]:
     """Everything on which the outcome of a rollout depends. More seeds or rollouts continue the same run."""
     names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "rules")
-    chosen = {name: getattr(settings, name) for name in names}
+    chosen = {**{name: getattr(settings, name) for name in names}, "look": str(look_named(settings.look))}
     if settings.remote:
         chosen["client"] = settings.remote.identity()
     if not settings.settle:

@@ -12,6 +12,7 @@ from ..envs.vector import MAX_SLOTS
 from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName, cut
 from ..learn.store import is_policy, read_settings
+from ..look.looks import ROOM, look_named
 from ..perturb.perturbation import Perturbation
 from ..pool import collection
 from ..work.foreign import is_factory
@@ -59,6 +60,7 @@ class EvaluateSettings:
     keep: list[str] = field(default_factory=list)
     perturb: str | None = None
     perturb_seed: int = 0
+    look: str = ROOM.name
 
     @cached_property
     def folders(self) -> list[str]:
@@ -136,6 +138,7 @@ class EvaluateSettings:
             raise BadConfig(
                 f"perturb = {self.perturb}; policy {self.name} gets no text: leave out what changes the text"
             )
+        look_named(self.look)
         if self.splits not in SPLITS:
             raise UnknownName("splits", self.splits, SPLITS)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1, perturb_seed=0)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ..assets.prop import table
 from ..errors import Infeasible, PoolError
 from ..installation import versions
+from ..look.looks import PLAIN
 from ..params import parameters
 from ..samplers.dists import Dist
 from ..samplers.split import ID
@@ -191,7 +192,7 @@ ROBOT_FIELDS = (
 @cache
 def robot_sha256(embodiment: str) -> str:
     """Hash of the robot of an embodiment on an empty table, in its first posture, to six digits: a million numbers."""
-    world = World.load(scene_text.emit(table())[0], embodiment, visual=True)
+    world = World.load(scene_text.emit(table())[0], embodiment, PLAIN)
     parts = [np.asarray(getattr(world.model, name), float).ravel() for name in ROBOT_FIELDS]
     parts.append(world.data.qpos)
     text = " ".join(f"{value + 0.0:.6g}" for value in np.concatenate(parts).tolist())

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..episode import STRICT, Rules, check_rules
 from ..errors import BadConfig, PoolError, ScengenError, cut
+from ..look.looks import Look, look_told
 from ..pool.files import MAX_JSON
 from ..pool.kinds import check_one
 from ..pool.shards import check_groups
@@ -168,6 +169,18 @@ class Recording:
     def stats(self) -> dict[str, Any]:
         """Content of `meta/stats.json`."""
         return self._read_json("stats.json")
+
+    @property
+    def look(self) -> Look:
+        """Look of the pictures.
+
+        Raises:
+            PoolError: this version of scengen cannot show it.
+        """
+        try:
+            return look_told(self.source.get("look"))
+        except BadConfig as error:
+            raise PoolError(f"{self.folder}/meta/scengen.json: {error}; record it again") from None
 
     @cached_property
     def source(self) -> dict[str, Any]:

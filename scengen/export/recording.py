@@ -25,6 +25,7 @@ from ..envs.observations import CAMERAS, Stream, action_names, cameras_of, named
 from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName
 from ..installation import versions
+from ..look.looks import PLAIN, ROOM, Look, look_named
 from ..orientation import Orientation
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
@@ -83,6 +84,7 @@ class RecordSettings:
     cameras: str | list[str] = field(default_factory=lambda: list(CAMERAS))
     width: int = 640
     height: int = 480
+    look: str | None = None
     workers: Workers = 1
 
     @cached_property
@@ -96,6 +98,12 @@ class RecordSettings:
         """Names of the cameras to record."""
         named = self.cameras if isinstance(self.cameras, list) else [self.cameras]
         return [] if named == [NONE] else named
+
+    @property
+    def shown(self) -> Look | None:
+        """Look of the pictures, if there are any. By default robosuite's recordings are plain, as its environments."""
+        chosen = look_named(self.look or (PLAIN if self.format == ROBOMIMIC else ROOM).name)
+        return chosen if self.camera_names else None
 
     @property
     def rate(self) -> int:
@@ -121,6 +129,7 @@ class RecordSettings:
             raise UnknownName("format of recordings", self.format, [LEROBOT, ROBOMIMIC])
         if self.rates not in (ONE_RATE, NATIVE_RATES):
             raise UnknownName("rates", self.rates, [ONE_RATE, NATIVE_RATES])
+        look_named(self.look or ROOM.name)
         at_least(self, n=1, fps=1, width=2, height=2, workers=1)
         periods_between(self.rate)
         if self.format == ROBOMIMIC:
@@ -187,7 +196,7 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                     left_out[str(row.name)] = lost[row.id]
                     continue
                 with ExitStack() as stack:
-                    world = stored_world(row, bool(settings.camera_names))
+                    world = stored_world(row, settings.shown)
                     scenario = tasks[row.task].scenario(row.params)
                     pictures = _camera(stack, world, settings, cameras_of(row.embodiment), scenario.orientation)
                     recorded.playing.orientation = scenario.orientation
@@ -202,6 +211,8 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                 progress(writer.episodes, count)
             source = {"pools": [pool.sha256 for pool in pools], "versions": versions()}
             source["task_versions"] = {name: task.version for name, task in tasks.items()}
+            if settings.shown:
+                source["look"] = str(settings.shown)
             writer.finish({**source, "styles": dict(styles)} if styles else source)
     return RecordSummary(writer.episodes, writer.rows, tuple(failed), left_out)
 

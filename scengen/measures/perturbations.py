@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..look.looks import ROOM
 from ..params import parameters
 from ..perturb.kinds import LEVELS, kinds
 from ..perturb.language import WORDINGS, Words
@@ -37,7 +38,7 @@ class Proofs(Measurement):
     def jobs(self, task: Task) -> Iterator[Job]:
         if self.chosen(task):
             strengths = {name: list(kind.strengths) for name, kind in kinds().items()}
-            yield Job(task, (ID,), {**self.options, "strengths": strengths})
+            yield Job(task, (ID,), {**self.options, "strengths": strengths, "look": str(ROOM)})
 
     def result(self, job: Job) -> Result:
         task = job.task

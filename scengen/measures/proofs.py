@@ -10,6 +10,7 @@ from ..control.loop import Loop
 from ..envs.object_state import ObjectState
 from ..envs.observations import Stream, cameras_of, privileged, streams_of
 from ..episode import Actions, Episode
+from ..look.looks import ROOM
 from ..orientation import Orientation
 from ..perturb.drawn import Drawn
 from ..perturb.effects import LANGUAGE, PICTURES
@@ -92,7 +93,7 @@ class Stage:
         """
         self.scenario, self.embodiment, self.witness = scenario, embodiment, witness
         self.words, self.secrets = words, secrets
-        self.world = World.load(scene_xml, embodiment, visual=True)
+        self.world = World.load(scene_xml, embodiment, ROOM)
         self.cameras = cameras_of(embodiment)
         self.streams: dict[str, Stream] = streams_of(embodiment)
         self.eye = Camera(self.world, SIZE, SIZE)

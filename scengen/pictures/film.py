@@ -13,6 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 from ..control.loop import Loop
 from ..episode import STRICT, Actions, Episode, Rules
 from ..errors import UnknownName
+from ..look.looks import ROOM, Look
 from ..means import MISSED, OPEN, SHOWN
 from ..pool import PoolRow
 from ..scenario import Scenario
@@ -42,6 +43,7 @@ class Take:
     embodiment: str
     actions: Actions
     rules: Rules = field(default=STRICT, kw_only=True)
+    look: Look = field(default=ROOM, kw_only=True)
 
     @classmethod
     def witness(cls, row: PoolRow, scenario: Scenario) -> "Take":
@@ -60,7 +62,7 @@ class Take:
             NoPictures: pictures of it cannot be made here.
         """
         check_pictures()
-        return World.load(self.scene_xml, self.embodiment, visual=True)
+        return World.load(self.scene_xml, self.embodiment, self.look)
 
     def moments(self, world: World, periods: Iterable[int]) -> Iterator[str]:
         """Replay the actions, stop after each of these numbers of control periods, and yield time and outcome."""

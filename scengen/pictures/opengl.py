@@ -107,8 +107,12 @@ class Renderer(mujoco.Renderer):
     _gl_context: Any = None  # `close` reads both, even if `__init__` has failed before it has set them
     _mjr_context: Any = None
 
-    def __init__(self, model: MjModel, height: int, width: int):
+    def __init__(self, model: MjModel, height: int, width: int, smooth_shadows: bool = False):
         """Make a context, with buffers that are large enough for the picture.
+
+        Args:
+            smooth_shadows: compute shadows and textures for each sample of a pixel, as MuJoCo computes edges. OpenGL
+                before version 4 cannot do it.
 
         Raises:
             Forked: this process was forked from one with OpenGL.
@@ -118,6 +122,8 @@ class Renderer(mujoco.Renderer):
         buffers = model.vis.global_
         buffers.offwidth, buffers.offheight = max(buffers.offwidth, width), max(buffers.offheight, height)
         super().__init__(model, height, width)
+        if smooth_shadows:
+            _shade_samples()
         self._release()
         _close_at_exit()
         _open_renderers.add(self)
@@ -151,6 +157,18 @@ class Renderer(mujoco.Renderer):
         if self._gl_context:
             release(self._gl_context)
 
+
+def _shade_samples() -> None:
+    """Let the current context compute the colour of each sample of a pixel, where it can."""
+    from OpenGL import GL  # here, because MuJoCo chooses its platform
+
+    if GL.glGetIntegerv(GL.GL_MAJOR_VERSION) >= SAMPLE_SHADING:
+        GL.glEnable(GL.GL_SAMPLE_SHADING)
+        GL.glMinSampleShading(1.0)
+
+
+SAMPLE_SHADING = 4
+"""First version of OpenGL that can shade samples."""
 
 _ending = False
 """Whether the process is ending."""

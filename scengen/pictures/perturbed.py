@@ -5,6 +5,7 @@ from contextlib import closing
 
 import numpy as np
 
+from ..look.looks import Look
 from ..perturb.effects import PICTURES
 from ..perturb.kinds import LEVELS, Kind, affects
 from ..perturb.perturbation import Perturbation
@@ -20,6 +21,7 @@ def sheet(
     scenario: Scenario,
     kinds: Sequence[Kind],
     camera: str,
+    look: Look,
     size: int,
     seed: int,
     progress: Progress = lambda done, total: None,
@@ -28,12 +30,13 @@ def sheet(
 
     Args:
         camera: robosuite's name of the camera.
+        look: look of the pictures.
         size: width and height of each picture [pixels].
         seed: seed of the perturbations.
     """
     shown = [kind for kind in kinds if kind.effect.reads == PICTURES and affects(kind.effect, camera)]
     levels = [Perturbation(((kind.name, level),)) for kind in shown for level in range(1, LEVELS + 1)]
-    pictures, world = list[Picture](), stored_world(row, visual=True)
+    pictures, world = list[Picture](), stored_world(row, look)
     with closing(Camera(world, size, size)) as eye:
 
         def taken() -> Picture:

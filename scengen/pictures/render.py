@@ -21,6 +21,7 @@ from PIL import Image
 from ..assets.prop import TABLE_TOP
 from ..errors import ScengenError, UnknownName
 from ..geometry import Vec3
+from ..look.looks import ROOM, Look, look_of
 from ..robots.panda import arms
 from ..sim.world import World
 from ..work.machine import free_address_space
@@ -31,9 +32,6 @@ Picture = NDArray[np.uint8]
 State = NDArray[np.float64]
 """State of a world, see `World.state`."""
 
-SHADOW_MAP_SIZE = 1024
-"""Edge of the shadow map [pixels]. MuJoCo's 4096 gives almost the same picture, which takes 1.6 times as long without a
-graphics card."""
 MIN_ADDRESS_SPACE = 2.5e9
 """Address space that a process needs for its first picture [bytes]: OpenGL in software takes 2.2 GB, most of it for the
 stacks of its threads."""
@@ -64,9 +62,10 @@ class Camera:
         opengl.check_size(width=width, height=height)
         self.world, self._lock = world, threading.Lock()
         check_pictures()
-        world.model.vis.quality.shadowsize = SHADOW_MAP_SIZE
+        look = look_of(world.model)
+        world.model.vis.quality.shadowsize = look.shadow_map_of(width, height)
         try:
-            self._renderer = opengl.Renderer(world.model, height, width)
+            self._renderer = opengl.Renderer(world.model, height, width, look.smooth_shadows)
         except Exception as error:  # its type depends on platform and back end: ImportError, AttributeError, GLError
             raise NoPictures(
                 f"no OpenGL for pictures ({' '.join(str(error).split())[:80]}); on Debian install libegl1 libgl1 "
@@ -98,18 +97,21 @@ class Camera:
             self._renderer.update_scene(data, camera=name or self._view, scene_option=self._options)
             return self._renderer.render()
 
-    def bodies(self, name: str) -> NDArray[np.int32]:
-        """Number of the body that each pixel of a named camera shows, shape (height, width); -1 for none."""
-        model, data = self.world.model, self.world.data
+    def geoms(self, name: str | None = None) -> NDArray[np.int32]:
+        """Number of the geom that each pixel shows, shape (height, width); -1 for none. Cameras as in `take`."""
         with self._lock:
             self._renderer.enable_segmentation_rendering()
             try:
-                self._renderer.update_scene(data, camera=name, scene_option=self._options)
+                self._renderer.update_scene(self.world.data, camera=name or self._view, scene_option=self._options)
                 shown = self._renderer.render()
             finally:
                 self._renderer.disable_segmentation_rendering()
-        geoms = (shown[..., 1] == mujoco.mjtObj.mjOBJ_GEOM) & (shown[..., 0] >= 0)
-        return np.where(geoms, model.geom_bodyid[np.where(geoms, shown[..., 0], 0)], -1)
+        return np.where(shown[..., 1] == mujoco.mjtObj.mjOBJ_GEOM, shown[..., 0], -1)
+
+    def bodies(self, name: str | None = None) -> NDArray[np.int32]:
+        """Number of the body that each pixel shows, shape (height, width); -1 for none. Cameras as in `take`."""
+        geoms = self.geoms(name)
+        return np.where(geoms >= 0, self.world.model.geom_bodyid[geoms], -1)
 
     def look_by(self, view: MjvCamera) -> None:
         """Choose a view."""
@@ -286,14 +288,14 @@ def check_pictures() -> None:
 
 
 @contextmanager
-def camera(scene_xml: str, embodiment: str, width: int = 320, height: int = 240) -> Iterator[Camera]:
+def camera(scene_xml: str, embodiment: str, width: int = 320, height: int = 240, look: Look = ROOM) -> Iterator[Camera]:
     """A camera at the start of a scene, with the robot's visual meshes; see `Camera`.
 
     Raises:
         NoPictures: OpenGL is missing.
     """
     check_pictures()  # before the meshes of the robot, which take a part of the address space
-    view = Camera(World.load(scene_xml, embodiment, visual=True), width, height)
+    view = Camera(World.load(scene_xml, embodiment, look), width, height)
     try:
         yield view
     finally:

@@ -8,6 +8,7 @@ import numpy as np
 from mujoco import MjvCamera
 
 from ..geometry import Vec3
+from ..look.looks import ROOM
 from ..pool.row import SceneRow
 from ..sim.world import World
 from ..validate.playable import check_scene, stored_world
@@ -52,7 +53,7 @@ def pair(row: SceneRow, twin_scene: str, directions: Directions) -> tuple[str, s
     """
     check_scene(row.scene_xml, row.embodiment)
     check_pictures()  # before the meshes of the robots, which take a part of the address space
-    worlds = World.load(twin_scene, row.embodiment, visual=True), stored_world(row, visual=True)
+    worlds = World.load(twin_scene, row.embodiment, ROOM), stored_world(row, ROOM)
     view = comparison_view(worlds, PICTURE[0] / PICTURE[1], directions)
     twin, here = (address(encode(each), "webp") for each in twin_pictures(*worlds, size=PICTURE, view=view))
     return twin, here, [(view.azimuth, view.elevation)]

@@ -16,6 +16,7 @@ from ..control.loop import ACTION, Loop
 from ..control.teleop import Filter
 from ..errors import NoEvent, UnknownName, Unstable
 from ..geometry import Mat3, Vec3
+from ..look.looks import Look
 from ..robots import panda
 from .arm import IDLE, ROBOT, Arm
 from .embodiment import JAW, all_hands, compose, hands
@@ -68,16 +69,18 @@ class World:
         self.filter, self.shown = Filter(len(self.arms)), np.zeros(MAX_MEANS)
 
     @classmethod
-    def load(cls, scene_xml: str, embodiment: str = JAW, visual: bool = False, substeps: int | None = None) -> Self:
+    def load(cls, scene_xml: str, embodiment: str = JAW, look: Look | None = None, substeps: int | None = None) -> Self:
         """Compile a scene text with the robot and put everything at its start.
 
         Args:
             scene_xml: MJCF of the scene, without the robot.
             embodiment: one of `EMBODIMENTS`.
-            visual: keep visual geometry for rendering; the physics is the same bit by bit.
+            look: look of its pictures; None: without visual geometry. The physics is the same bit by bit.
             substeps: physics steps in a control period of 10 ms; by default the scene's own time step decides.
         """
-        spec = compose(scene_xml, embodiment, visual)
+        spec = compose(scene_xml, embodiment, look is not None)
+        if look is not None:
+            look.dress(spec)
         if substeps is not None:
             spec.option.timestep = Loop.PERIOD / substeps
         return cls.of(spec.compile(), len(all_hands(embodiment)) - len(hands(embodiment)))

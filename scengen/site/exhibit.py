@@ -13,6 +13,7 @@ import viser
 
 from .. import compose
 from ..errors import BadConfig, Infeasible, ScengenError
+from ..look.looks import PLAIN
 from ..pictures import film
 from ..pictures.render import Picture, camera, encode
 from ..pictures.sheet import moved
@@ -223,7 +224,7 @@ def _certified(task: Task) -> PoolRow:
 
 def _clip(task: Task, row: PoolRow, title: str, folder: Path, stem: str) -> Clip:
     """The film of a witness or of a shortcut."""
-    scenario, world, horizon = task.scenario(row.params), stored_world(row, visual=True), row.horizon
+    scenario, world, horizon = task.scenario(row.params), stored_world(row, PLAIN), row.horizon
     actions = row.witness
     if title != film.WITNESS:
         take, _ = film.shortcut(row, scenario, title)
@@ -241,7 +242,7 @@ def _pair(task: Task, axis: Axis, folder: Path, stem: str) -> Pair:
     if not draws:
         return Pair(axis.name, "", [], False)
     scenarios = [task.draw(ID, SEED, index).scenario, *(draw.scenario for draw in draws)]
-    worlds = [World.load(rebuild(scenario), task.embodiment, visual=True) for scenario in scenarios]
+    worlds = [World.load(rebuild(scenario), task.embodiment, PLAIN) for scenario in scenarios]
     pictures = twin_pictures(*worlds, size=TWIN, view=comparison_view(worlds, TWIN[0] / TWIN[1]))
     files = [f"{stem}-{number}.webp" for number in range(len(pictures))]
     for name, picture in zip(files, pictures, strict=True):

@@ -9,6 +9,7 @@ import numpy as np
 import viser
 
 from ..geometry import Vec3
+from ..look.looks import PLAIN
 from ..pictures import film
 from ..pictures.page import template
 from ..pictures.sheet import moved, twin_scene
@@ -139,7 +140,7 @@ class Browser:
         self._about.content = self._description(row, best)  # what is read is shown before what is simulated
         self.player.outcome.content = template("studio_fault.html").render(note="trying the scene ...")
         check_row(row)
-        self._row, self._world = row, stored_world(row, visual=True)
+        self._row, self._world = row, stored_world(row, look=PLAIN)
         with self._client.atomic():
             self._view.show(self._world)
         shortcuts = self.task.scenario(row.params).shortcuts()
@@ -160,7 +161,7 @@ class Browser:
                 self._look(CAMERA, LOOK_AT)
                 return
             self._look(CAMERA_FOR_TWO, LOOK_AT_FOR_TWO)
-            world = World.load(twin_scene(self.pool, self.task, row), self.task.embodiment, visual=True)
+            world = World.load(twin_scene(self.pool, self.task, row), self.task.embodiment, look=PLAIN)
             self._twin.show(world, TWIN_OFFSET, robot=False)
             self._label = self._client.scene.add_label("/twin_label", "training twin", position=LABEL_OFFSET)
 

@@ -5,6 +5,7 @@ from contextlib import contextmanager, suppress
 
 from ..episode import Actions
 from ..errors import PoolError, Unstable, cut
+from ..look.looks import Look
 from ..pool.row import NO_WITNESS, SceneRow
 from ..pool.rows import AnyRow
 from ..sim.world import World
@@ -25,17 +26,17 @@ def play(what: Played) -> None:
             world.step_filtered(action)
 
 
-def stored_world(row: SceneRow, visual: bool = False) -> World:
+def stored_world(row: SceneRow, look: Look | None = None) -> World:
     """The world of a stored scene at its start.
 
     Args:
-        visual: see `World.load`.
+        look: see `World.load`.
 
     Raises:
         PoolError: MuJoCo does not read the scene.
     """
     with scene_errors(f" of {row.name}"):
-        return World.load(row.scene_xml, row.embodiment, visual)
+        return World.load(row.scene_xml, row.embodiment, look)
 
 
 @contextmanager

@@ -26,6 +26,7 @@ from scengen.errors import BadConfig
 from scengen.evaluate.settings import EvaluateSettings
 from scengen.export import recording
 from scengen.export.mjcf import export, without_slashes
+from scengen.look.looks import PLAIN
 from scengen.ood import axis_card
 from scengen.ood.discovery import search as discovery
 from scengen.pictures import film, render
@@ -225,7 +226,7 @@ def test_exported_scenes_open_from_anywhere(pool, tmp_path):
         folder = moved / row.id
         alone = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
         whole = mujoco.MjModel.from_xml_path(str(folder / "scene_with_robot.xml"))
-        world = World.load(row.scene_xml, row.embodiment, visual=True)
+        world = World.load(row.scene_xml, row.embodiment, look=PLAIN)
         assert alone.nbody < whole.nbody == world.model.nbody and whole.nq == world.model.nq
         start = mujoco.MjData(whole)
         mujoco.mj_resetDataKeyframe(whole, start, whole.key("home").id)

@@ -23,6 +23,7 @@ from scengen.envs.object_state import RESOLUTION
 from scengen.episode import Episode
 from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.installation import versions
+from scengen.look.looks import PLAIN
 from scengen.pool import Pool
 from scengen.pool.row import NO_WITNESS
 from scengen.robots import panda
@@ -119,14 +120,14 @@ def test_the_text_of_a_scene_means_the_same_to_robosuite(task):
 
 
 def test_robosuite_compiles_the_certified_model(row, env):
-    ours = World.load(row.scene_xml, row.embodiment, visual=True).model
+    ours = World.load(row.scene_xml, row.embodiment, look=PLAIN).model
     assert different(env.world.model, ours, 0.0) == []
     for kind, count in ((mujoco.mjtObj.mjOBJ_BODY, ours.nbody), (mujoco.mjtObj.mjOBJ_ACTUATOR, ours.nu)):
         assert names(env.world.model, kind, count) == names(ours, kind, count)
 
 
 def test_robosuite_compiles_the_certified_model_with_a_suction_cup(sucking):
-    ours = World.load(sucking.row.scene_xml, sucking.row.embodiment, visual=True).model
+    ours = World.load(sucking.row.scene_xml, sucking.row.embodiment, look=PLAIN).model
     # The cup passes through a text of six digits; `site_size` differs in numbers that a sphere does not have.
     assert set(different(sucking.world.model, ours, 1e-12)) <= {"site_size"}
 

@@ -13,6 +13,7 @@ from scengen import cli, list_tasks, load_task
 from scengen.assets.box import Cube, Domino
 from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.envs.observations import CAMERAS
+from scengen.look.looks import PLAIN
 from scengen.means import MISSED, SHOWN
 from scengen.pictures import film, render
 from scengen.pictures.view import view
@@ -131,7 +132,7 @@ def test_the_clearest_view_sees_past_a_wall(opacity, hidden):
 
 def test_no_collision_hull_of_any_arm_is_in_the_picture():
     task = load_task("plate_shelf_hobi")
-    model = World.load(rebuild(task.family()), task.embodiment, visual=True).model
+    model = World.load(rebuild(task.family()), task.embodiment, look=PLAIN).model
     render.hide_hulls(model)
     names = [model.body(body).name for body in model.geom_bodyid]
     for number in (0, 1):

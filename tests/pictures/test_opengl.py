@@ -13,6 +13,7 @@ from helpers import REFERENCE, needs_robosuite, pictures_are_possible
 from scengen import cli
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig
+from scengen.look.looks import PLAIN
 from scengen.pictures.render import Camera
 from scengen.pool import Pool
 from scengen.sim.world import World
@@ -22,7 +23,7 @@ drawing = pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL")
 
 @pytest.fixture(scope="module")
 def world():
-    return World.load(Pool.open(REFERENCE).at(0).scene_xml, visual=True)
+    return World.load(Pool.open(REFERENCE).at(0).scene_xml, look=PLAIN)
 
 
 def filmed(**arguments):

@@ -7,6 +7,7 @@ import pytest
 
 from scengen.errors import NoEvent, UnknownName, Unstable
 from scengen.geometry import between
+from scengen.look.looks import PLAIN
 from scengen.sim.arm import IDLE, ROBOT
 from scengen.sim.world import World
 from scengen.skills.motion import ANGLE_TOLERANCE, FINE, facing_down, go_to
@@ -47,7 +48,7 @@ def test_a_saved_state_continues_bit_by_bit_filter_included(world):
 
 
 def test_visual_geometry_changes_no_bit(world):
-    assert play(world, WAVE) == play(World.load(SCENE, visual=True), WAVE)
+    assert play(world, WAVE) == play(World.load(SCENE, look=PLAIN), WAVE)
 
 
 def test_what_the_controller_gets_is_what_is_returned_and_replays(world):

@@ -28,6 +28,7 @@ from scengen.demos.teleop.eye import POLICY_CAMERA
 from scengen.demos.teleop.pad import PadEvent
 from scengen.demos.teleop.session import ENDED, PAUSED, READY
 from scengen.envs.observations import cameras_of
+from scengen.look.looks import ROOM
 from scengen.pictures.render import Camera
 from scengen.pool import Pool
 from scengen.pool.demonstrations import Demonstrations
@@ -150,7 +151,7 @@ def test_a_page_shows_the_picture_that_a_policy_sees_where_it_is_turned(chromium
         tab.wait(lambda: shown_picture(tab.page) is not None and shown_picture(tab.page).std() > 10, "a picture")
         shown = shown_picture(tab.page)
         stage = studio.content.driver.session.stage
-    with contextlib.closing(Camera(stage.world(visual=True), *PICTURE)) as camera:
+    with contextlib.closing(Camera(stage.world(ROOM), *PICTURE)) as camera:
         plain = camera.take(cameras_of(stage.embodiment)[POLICY_CAMERA]).astype(float)
     seen = stage.scenario.orientation.apply(plain)
     assert np.abs(shown - seen).mean() < 5 < np.abs(shown - plain).mean()

@@ -8,6 +8,7 @@ pytest.importorskip("viser", reason="no viser; it is in the extra studio")
 import trimesh
 
 from scengen import load_task
+from scengen.look.looks import PLAIN
 from scengen.pictures.render import hide_hulls
 from scengen.sim.world import World
 from scengen.studio.scene import GRID, PEDESTAL, _meshes, _rounded, _simplification
@@ -17,7 +18,7 @@ from scengen.validate.rebuilt import rebuild
 @pytest.fixture(scope="module", params=["panda_jaw", "panda_suction"])
 def world(request):
     task = load_task({"panda_jaw": "domino_single", "panda_suction": "cracker_box_suction"}[request.param])
-    made = World.load(rebuild(task.nominal), task.embodiment, visual=True)
+    made = World.load(rebuild(task.nominal), task.embodiment, look=PLAIN)
     hide_hulls(made.model)
     return made
 

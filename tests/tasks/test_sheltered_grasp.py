@@ -22,6 +22,7 @@ from scengen import load_task
 from scengen.assets.box import Cube
 from scengen.assets.prop import TABLE_TOP
 from scengen.assets.rack import STOREYS, TierRack
+from scengen.look.looks import PLAIN
 from scengen.params import values, with_values
 from scengen.pictures import opengl
 from scengen.pictures.render import hide_hulls
@@ -105,7 +106,7 @@ def test_a_memorised_motion_serves_no_rack_that_opens_another_way(split):
 
 def pixels(scenario):
     """Pixels of the object in the picture of every camera, by the camera's name."""
-    w = World.load(scene_text.emit(scenario.build())[0], TASK.embodiment, visual=True)
+    w = World.load(scene_text.emit(scenario.build())[0], TASK.embodiment, look=PLAIN)
     hide_hulls(w.model)
     renderer = opengl.Renderer(w.model, 480, 640)
     renderer.enable_segmentation_rendering()

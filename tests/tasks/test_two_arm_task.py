@@ -26,6 +26,7 @@ from scengen.evaluate import policies
 from scengen.evaluate.player import BadPolicy, PolicyPlayer
 from scengen.evaluate.settings import EvaluateSettings as Evaluation
 from scengen.evaluate.settings import RolloutId
+from scengen.look.looks import PLAIN
 from scengen.pool import Pool
 from scengen.pool.untrusted import Malformed
 from scengen.sim.world import World
@@ -124,7 +125,7 @@ def test_streams_of_the_second_arm_are_its_own(rows):
 
 @pytest.mark.parametrize("embodiment", [PAIR, "panda_suction+panda_jaw"])
 def test_every_camera_is_in_the_model(rows, embodiment):
-    model = World.load(rows[0].scene_xml, embodiment, visual=True).model
+    model = World.load(rows[0].scene_xml, embodiment, look=PLAIN).model
     assert "robot1_rgb_gripper_cam" in cameras_of(embodiment)
     assert all(
         mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, name) >= 0 for name in cameras_of(embodiment).values()
@@ -138,7 +139,7 @@ def test_robosuite_makes_both_arms_and_comes_to_the_same_verdict(rows):
     blind = {"use_camera_obs": False, "has_offscreen_renderer": False}
     env = made(robots=["Panda", "Panda"], scenario=rows[0], **blind)
     assert env.action_dim == 14 and "robot1_eef_pos" in env.reset()
-    ours, theirs = World.load(rows[0].scene_xml, PAIR, visual=True).model, env.world.model
+    ours, theirs = World.load(rows[0].scene_xml, PAIR, look=PLAIN).model, env.world.model
     for name in ("body_mass", "body_pos", "body_quat", "geom_size", "geom_friction", "jnt_range", "actuator_ctrlrange"):
         np.testing.assert_array_equal(getattr(theirs, name), getattr(ours, name), err_msg=name)
     for wrong in ({"robots": "Panda"}, {"gripper_types": "PandaGripper"}, {"env_configuration": "opposed"}):

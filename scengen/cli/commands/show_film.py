@@ -1,7 +1,7 @@
 """write a strip or a video of a witness, a failing shortcut, a demonstration, a policy's rollout, or the adversary"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ from ...attack.evidence import OTHER_SCENARIO, Hit
 from ...envs.observations import ALL, cameras_of
 from ...episode import check_rules
 from ...errors import BadConfig
+from ...look.looks import look_named
 from ...ood.analysis.redraw import task_of
 from ...pictures.film import WITNESS, Take, movie, periods_between, shortcut, strip
 from ...pictures.render import check_pictures, encode
@@ -44,6 +45,7 @@ class FilmSettings:
     run: int | None
     raw: bool
     camera: str | None
+    look: str
     frames: int
     fps: int
     width: int
@@ -62,6 +64,7 @@ class FilmSettings:
             raise BadConfig(f"to = {self.to}; give a .png file for a film strip or an .mp4 file for a video")
         if self.raw and self.of == WITNESS:
             raise BadConfig("raw = true plays a shortcut without the filter; give one as of=NAME, or leave raw out")
+        look_named(self.look)
         at_least(self, frames=1, fps=1, width=1, height=1)
         check_format(Path(self.to), self.frames, self.fps, self.width, self.height)
 
@@ -82,7 +85,7 @@ def command(arguments: Arguments) -> int:
     settings.check()
     try_file(settings.to)
     check_pictures()
-    take = _take(settings, arguments)
+    take = replace(_take(settings, arguments), look=look_named(settings.look))
     target, size = Path(settings.to), (settings.width, settings.height)
     with ProgressBar(err, "film", 1) as bar:
         if target.suffix == ".png":

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ...envs.observations import cameras_of
 from ...errors import BadConfig, UnknownName
+from ...look.looks import look_named
 from ...ood.analysis.redraw import task_of
 from ...perturb.kinds import kind_of, kinds
 from ...perturb.perturbation import Perturbation
@@ -31,12 +32,14 @@ class SheetSettings:
     perturb: str
     to: str
     camera: str
+    look: str
     size: int
     seed: int
 
 
 def command(arguments: Arguments) -> int:
     settings = read("show perturb", arguments, SheetSettings)
+    look = look_named(settings.look)
     at_least(settings, size=16, seed=0)
     if Path(settings.to).suffix not in (".png", ".webp"):
         raise BadConfig(f"to = {settings.to}; give a .png or .webp file")
@@ -55,7 +58,7 @@ def command(arguments: Arguments) -> int:
         Perturbation(((kind.name, 1),)).check((), [camera])
     scenario = task_of(pool, search_path(arguments)).scenario(row.params)
     with ProgressBar(err, "sheet", 1) as bar:
-        picture = sheet(row, scenario, wanted, camera, settings.size, settings.seed, bar.of)
+        picture = sheet(row, scenario, wanted, camera, look, settings.size, settings.seed, bar.of)
     write(Path(settings.to), encode(picture, Path(settings.to).suffix[1:]))
     for kind in wanted:
         say(f"{kind.name}: {', '.join(f'{each:g}' for each in kind.strengths)} {kind.unit}. {kind.why}")

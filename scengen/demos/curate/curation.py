@@ -155,6 +155,7 @@ def _examined(
                         films,
                         recording.calibrations,
                         frozen,
+                        recording.look,
                     )
                 )
         else:

@@ -19,6 +19,7 @@ from ...export.dataset import rules_of
 from ...export.lerobot import IMAGES_PREFIX, INDEX_FEATURES
 from ...export.recording import CONTROL_ACTIONS, STATE
 from ...export.streams import ENVIRONMENT
+from ...look.looks import Look
 from ...pictures.render import Camera, NoPictures, Picture
 from ...samplers.task import Task
 from ...scenario import Scenario
@@ -70,6 +71,8 @@ class Recorded:
     frozen: Mapping[str, Finding]
     """The finding of each camera whose picture stands still while the arm moves. It holds if that of the replay moves,
     and if there is none."""
+    look: Look
+    """Look of the pictures."""
 
     @classmethod
     def of(
@@ -83,6 +86,7 @@ class Recorded:
         films: Mapping[str, tuple[Probe, ...]],
         cameras: Mapping[str, Mapping[str, Any]],
         frozen: Mapping[str, Finding],
+        look: Look,
     ) -> "Recorded":
         """The parts of an episode that a replay compares.
 
@@ -98,7 +102,7 @@ class Recorded:
         told = {name: value for name, value in about.items() if not name.startswith("stats/")}
         params, horizon = json.loads(about["scengen/params"]), float(about["scengen/horizon"])
         actions, rows = columns[CONTROL_ACTIONS], (states, results, told, tuple(entries))
-        return cls(number, task, params, horizon, rules_of(about), actions, *rows, size, films, cameras, frozen)
+        return cls(number, task, params, horizon, rules_of(about), actions, *rows, size, films, cameras, frozen, look)
 
     @property
     def bodies(self) -> list[str]:
@@ -177,7 +181,7 @@ def _replayed(recorded: Recorded) -> Replayed:
     scenario, robot = task.scenario(recorded.params), task.embodiment
     text = rebuild(scenario)
     labels = tuple(wrong_labels(recorded.told, task, scenario, text))
-    found = _played(recorded, scenario, World.load(text, robot, visual=bool(recorded.films)), text)
+    found = _played(recorded, scenario, World.load(text, robot, recorded.look if recorded.films else None), text)
     return replace(found, findings=(*labels, *found.findings))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...envs.observations import cameras_of
 from ...errors import UnknownName
+from ...look.looks import ROOM
 from ...orientation import UPRIGHT
 from ...pictures.render import Camera, Picture
 from .session import Session
@@ -80,7 +81,7 @@ class Eye:
             while self._open:
                 stage = self._stage
                 held = stage.scenario.orientation if self._camera else UPRIGHT
-                with closing(Camera(stage.world(visual=True), *self._size)) as eye:
+                with closing(Camera(stage.world(ROOM), *self._size)) as eye:
                     while self._open and stage is self._stage:
                         begun = time.monotonic()
                         _place(eye, self._state)

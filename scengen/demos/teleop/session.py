@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...control.loop import Loop
 from ...episode import STRICT, Actions, Episode, Outcome, Rules
 from ...errors import ScengenError
+from ...look.looks import Look
 from ...scenario import Scenario
 from ...sim.boxes import box_around
 from ...sim.world import World
@@ -51,9 +52,9 @@ class Stage:
     rules: Rules = STRICT
     """Rules that end the episode."""
 
-    def world(self, visual: bool = False) -> World:
+    def world(self, look: Look | None = None) -> World:
         """The world of its scene at the start."""
-        return World.load(self.scene_xml, self.embodiment, visual)
+        return World.load(self.scene_xml, self.embodiment, look)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Looks: textures, materials, lights and surroundings of a scene, which pictures alone show."""
