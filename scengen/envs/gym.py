@@ -202,7 +202,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         streams, cameras = _requested(names, self.task, rows, lambda: self.scenario.orientation)
         self.observed = ObservationSettings(streams, cameras, width, height)
         shown = [] if render_mode is None else [cameras_of(self.task.embodiment).get(camera, camera)]
-        self.perturbation.check([*streams], [*cameras.values(), *shown])
+        self.perturbation.check([*streams], [*cameras.values(), *shown], self.look)
         if self._needs_pictures:
             self.observed.check_picture_size(self.task, self._rows)
         self.metadata = {
@@ -371,7 +371,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _load(self, row: PoolRow) -> None:
         if self._world is None or row.id != self._row.id:
             self.close()
-            self._world = stored_world(row, self.look if self._needs_pictures else None)
+            self._world = stored_world(row, self.perturbation.dressed(self.look) if self._needs_pictures else None)
             self._scenario = self.task.scenario(row.params)
             model = self._world.model
             bodies = [model.body(number).name for number in range(model.nbody)] if self.perturbation else ()

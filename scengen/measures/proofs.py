@@ -12,6 +12,7 @@ from ..envs.observations import Stream, cameras_of, privileged, streams_of
 from ..episode import Actions, Episode
 from ..look.looks import ROOM
 from ..orientation import Orientation
+from ..perturb.distractors import in_the_way, spares, visible, with_spares
 from ..perturb.drawn import Drawn
 from ..perturb.effects import LANGUAGE, PICTURES
 from ..perturb.kinds import LEVELS, Kind, affects, stream_kind
@@ -29,6 +30,10 @@ MIN_CHANGE = 1.0
 """Least mean difference of a picture, over pixels and channels, in the moment at which it is largest [grey levels]."""
 MIN_READING_CHANGE = 1e-4
 """Least largest difference of a reading, in the moment at which it is largest [m, rad, N]."""
+CLEARANCE = 0.005
+"""Least distance of distractors from all that moves in the witness [m]."""
+SWEEP = 5
+"""Number of control periods between two moments at which that distance is checked."""
 PASSING = 25
 """Number of control periods after a moment over which a kind is judged that changes some pictures only."""
 MIN_PIXELS = 8
@@ -58,6 +63,8 @@ class Proof:
     """Bodies that no camera keeps in sight at a moment at which clean pictures show them."""
     leaks: tuple[str, ...] = ()
     """Names of what is shifted or hidden that the text has."""
+    is_crossed: bool = False
+    """Whether the witness comes close to a distractor."""
 
     def faults(self) -> Iterator[str]:
         """What is not proved."""
@@ -72,6 +79,8 @@ class Proof:
             yield f"{body} is out of sight"
         for name in self.leaks:
             yield f"the text names {name}"
+        if self.is_crossed:
+            yield "a distractor is in the way"
 
 
 class Stage:
@@ -93,7 +102,7 @@ class Stage:
         """
         self.scenario, self.embodiment, self.witness = scenario, embodiment, witness
         self.words, self.secrets = words, secrets
-        self.world = World.load(scene_xml, embodiment, ROOM)
+        self.world = World.load(scene_xml, embodiment, with_spares(ROOM))
         self.cameras = cameras_of(embodiment)
         self.streams: dict[str, Stream] = streams_of(embodiment)
         self.eye = Camera(self.world, SIZE, SIZE)
@@ -112,7 +121,9 @@ class Stage:
             self.scenario.id, bodies=self.world.free_bodies, words=self.words
         )
         with drawn.while_applied(self.world.model) as changed:
-            neutral = all(name.startswith(SEEN) for name in changed)
+            if any(name.startswith("tex_") for name in changed):
+                self.eye.refresh()
+            neutral = all(name.startswith(SEEN) or self._is_spare(name, rows) for name, rows in changed.items())
             if kind.effect.reads == LANGUAGE:
                 return self._text_proof(drawn.instruction or "", not changed)
             if kind.effect.reads != PICTURES:
@@ -132,7 +143,26 @@ class Stage:
                     hidden |= self._lost(self.shown[number], self._counts(self._uncovered(drawn, ids)))
             if level == LEVELS and changed:
                 neutral = neutral and self._played()[1] == self.digest
-        return Proof(neutral, changes, tuple(sorted(hidden)))
+            crossed = self._is_crossed()
+        if any(name.startswith("tex_") for name in changed):
+            self.eye.refresh()
+        return Proof(neutral, changes, tuple(sorted(hidden)), is_crossed=crossed)
+
+    def _is_spare(self, name: str, rows: NDArray[np.int64]) -> bool:
+        """Whether only spare geoms differ in an array."""
+        return name.startswith("geom_") and set(rows.tolist()) <= {*spares(self.world.model)}
+
+    def _is_crossed(self) -> bool:
+        """Whether the witness comes close to a distractor."""
+        model = self.world.model
+        if not visible(model):
+            return False
+        moving = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] and model.geom_contype[g]]
+        for period in range(0, len(self.states), SWEEP):
+            self.world.restore(self.states[period])
+            if in_the_way(model, self.world.data, moving, CLEARANCE):
+                return True
+        return False
 
     def _text_proof(self, text: str, neutral: bool) -> Proof:
         """How far a text is from the instruction, and what it gives away."""

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -71,11 +72,11 @@ class Drawn:
             self.effects[name].on_model(model, values)
 
     @contextmanager
-    def while_applied(self, model: mujoco.MjModel) -> Iterator[set[str]]:
-        """Change a compiled scene as `on_model` during a `with` statement; the names of the arrays that differ then."""
+    def while_applied(self, model: mujoco.MjModel) -> Iterator[Mapping[str, NDArray[np.int64]]]:
+        """Change a compiled scene as `on_model` during a `with` statement; by name the rows of arrays that differ."""
         before = arrays(model)
         self.on_model(model)
-        changed = {name for name, array in arrays(model).items() if array.tobytes() != before[name].tobytes()}
+        changed = {name: rows for name, array in arrays(model).items() if (rows := _unequal(array, before[name])).size}
         try:
             yield changed
         finally:
@@ -149,6 +150,12 @@ class Senses:
 def _period(time: float) -> int:
     """Number of the control period at a time."""
     return round(time / Loop.PERIOD)
+
+
+def _unequal(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.int64]:
+    """Numbers of the rows that have not the same bits."""
+    differs = one.view(np.uint8) != other.view(np.uint8) if one.size else np.zeros(0, bool)
+    return np.flatnonzero(differs.reshape(len(one), -1).any(axis=1)) if one.size else np.zeros(0, np.int64)
 
 
 def arrays(model: mujoco.MjModel) -> dict[str, NDArray[np.generic]]:

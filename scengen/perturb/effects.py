@@ -5,7 +5,7 @@ compiled scene, of which only pictures see lights, colours and cameras, or each 
 """
 
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -16,6 +16,9 @@ from scipy.ndimage import gaussian_filter
 
 from ..assets.prop import TABLE_TOP
 from ..geometry import Vec3, rotation
+from ..look.looks import LOOKS, ROOM
+from ..look.room import PLASTER, TABLE
+from .distractors import put
 from .language import CLAUSES, WORDINGS, Words, extended, worded
 
 Values = Mapping[str, float | Sequence[float]]
@@ -44,6 +47,8 @@ EVERY = "all cameras"
 """Cameras that a kind changes: all."""
 TABLE_CENTRE: Vec3 = np.array([0.0, 0.0, TABLE_TOP])
 """Place at which the key light aims [m]."""
+ROOM_ONLY = (ROOM.name,)
+"""Looks that have walls and textures."""
 EYE = "eye_in_hand"
 """End of the names of the cameras on wrists."""
 
@@ -70,6 +75,10 @@ class Effect:
     """Whether scenarios differ in what is drawn. The level alone decides else."""
     is_passing: bool = False
     """Whether it changes some pictures of an episode only, so that what it hides is seen again in the next ones."""
+    looks: Collection[str] = tuple(LOOKS)
+    """Names of the looks that show it."""
+    is_added: bool = False
+    """Whether it shows spare geoms, with which the scene must be compiled (`scengen.perturb.distractors`)."""
     is_late: bool = False
     """Whether pictures arrive `seconds` late."""
 
@@ -157,6 +166,51 @@ def _paint(geom: str) -> Callable[[mujoco.MjModel, Values], None]:
         model.geom(geom).rgba[:3] = _blended(np.asarray(model.geom(geom).rgba[:3], float), values)
 
     return change
+
+
+def _colour_of(material: str) -> Callable[[mujoco.MjModel, Values], None]:
+    """Blend the colours of all geoms of a material that a look has given."""
+
+    def change(model: mujoco.MjModel, values: Values) -> None:
+        made = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL, material)
+        for geom in np.flatnonzero(model.geom_matid == made) if made >= 0 else ():
+            model.geom_rgba[geom, :3] = _blended(np.asarray(model.geom_rgba[geom, :3], float), values)
+
+    return change
+
+
+def _pattern(strength: float, rng: Random) -> Values:
+    colour, cells = rng.uniform(0.2, 1.0, 3).tolist(), int(rng.integers(2, 9))
+    return {"share": strength, "colour": colour, "cells": cells, "kind": int(rng.integers(len(PATTERNS)))}
+
+
+def _print_table(model: mujoco.MjModel, values: Values) -> None:
+    """Blend the texture of the table with a pattern."""
+    material = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL, TABLE.name)
+    if material < 0:
+        return
+    texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB])
+    shape = (model.tex_height[texture], model.tex_width[texture], model.tex_nchannel[texture])
+    start = model.tex_adr[texture]
+    data = model.tex_data[start : start + int(np.prod(shape))]
+    cells, kind = (round(float(np.asarray(values[name]))) for name in ("cells", "kind"))
+    shade = PATTERNS[kind](*(np.indices(shape[:2]) * cells / shape[0]))[..., None]
+    pattern = 255.0 * (shade + (1.0 - shade) * np.asarray(values["colour"], float))
+    share = float(np.asarray(values["share"]))
+    data[:] = ((1.0 - share) * data.reshape(shape) + share * pattern).round().astype(np.uint8).ravel()
+
+
+PATTERNS: Sequence[Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]] = (
+    lambda rows, columns: (np.floor(rows) + np.floor(columns)) % 2.0,
+    lambda rows, columns: np.floor(2.0 * rows) % 2.0,
+    lambda rows, columns: (np.hypot(rows % 1.0 - 0.5, columns % 1.0 - 0.5) > 0.3).astype(float),
+)
+"""Checks, stripes and dots on a tile: 0 or 1 at places that are given in cells."""
+
+
+def _show_things(model: mujoco.MjModel, values: Values) -> None:
+    number, key = (round(float(np.asarray(values[name]))) for name in ("number", "key"))
+    put(model, number, key)
 
 
 # --- cameras ------------------------------------------------------------------------------------
@@ -312,6 +366,14 @@ EFFECTS: Mapping[str, Effect] = {
     "shadow": Effect(_value("shift"), on_model=_contrast, varies=False),
     "table_colour": Effect(_colour, on_model=_paint("table_top")),
     "floor_colour": Effect(_colour, cameras=FIXED, on_model=_paint("floor")),
+    "wall_colour": Effect(_colour, cameras=FIXED, on_model=_colour_of(PLASTER.name), looks=ROOM_ONLY),
+    "table_texture": Effect(_pattern, on_model=_print_table, looks=ROOM_ONLY),
+    "distractors": Effect(
+        lambda strength, rng: {"number": strength, "key": int(rng.integers(2**31))},
+        cameras=FIXED,
+        on_model=_show_things,
+        is_added=True,
+    ),
     "camera_position": Effect(_shift, cameras=FIXED, on_model=_move_cameras(FIXED)),
     "camera_angle": Effect(_turn, cameras=FIXED, on_model=_move_cameras(FIXED)),
     "camera_fov": Effect(_zoom, on_model=_move_cameras(EVERY)),

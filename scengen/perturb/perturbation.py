@@ -9,6 +9,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ..errors import BadConfig
+from ..look.looks import ROOM, Look
+from .distractors import with_spares
 from .drawn import Drawn, random
 from .effects import LANGUAGE, PICTURES
 from .kinds import LEVELS, affects, kind_of, kinds, stream_kind
@@ -57,17 +59,26 @@ class Perturbation:
         """Whether a part changes the instruction."""
         return any(kinds()[name].effect.reads == LANGUAGE for name, _ in self.parts)
 
-    def check(self, streams: Sequence[str], cameras: Sequence[str]) -> None:
+    def dressed(self, look: Look) -> Look:
+        """A look of a scene that is to be perturbed: with spare geoms if a part shows them."""
+        return with_spares(look) if any(kinds()[name].effect.is_added for name, _ in self.parts) else look
+
+    def check(self, streams: Sequence[str], cameras: Sequence[str], look: Look = ROOM) -> None:
         """Raise `BadConfig` if a part affects nothing that is observed. The instruction can always be read.
 
         Args:
             streams: names of the observed streams.
             cameras: robosuite's names of the observed cameras.
+            look: look of the pictures.
         """
         for name, level in self.parts:
             effect = kinds()[name].effect
             if effect.reads == LANGUAGE:
                 continue
+            if look.name not in effect.looks:
+                raise BadConfig(
+                    f"perturb = {name}@{level} shows in look={' and '.join(effect.looks)}, not in {look.name}"
+                )
             if effect.reads == PICTURES:
                 seen = [camera for camera in cameras if affects(effect, camera)]
                 what = (

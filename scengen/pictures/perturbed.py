@@ -6,7 +6,7 @@ from contextlib import closing
 import numpy as np
 
 from ..look.looks import Look
-from ..perturb.effects import PICTURES
+from ..perturb.distractors import with_spares
 from ..perturb.kinds import LEVELS, Kind, affects
 from ..perturb.perturbation import Perturbation
 from ..pool import PoolRow
@@ -34,12 +34,13 @@ def sheet(
         size: width and height of each picture [pixels].
         seed: seed of the perturbations.
     """
-    shown = [kind for kind in kinds if kind.effect.reads == PICTURES and affects(kind.effect, camera)]
+    shown = [k for k in kinds if affects(k.effect, camera) and look.name in k.effect.looks and not k.effect.is_late]
     levels = [Perturbation(((kind.name, level),)) for kind in shown for level in range(1, LEVELS + 1)]
-    pictures, world = list[Picture](), stored_world(row, look)
+    pictures, world = list[Picture](), stored_world(row, with_spares(look))
     with closing(Camera(world, size, size)) as eye:
 
         def taken() -> Picture:
+            world.reset()
             return scenario.orientation.apply(eye.take(camera)).copy()
 
         clean = taken()

@@ -23,7 +23,7 @@ from ..errors import ScengenError, UnknownName
 from ..geometry import Vec3
 from ..look.looks import ROOM, Look, look_of
 from ..robots.panda import arms
-from ..sim.world import World
+from ..sim.world import World, scene_geoms
 from ..work.machine import free_address_space
 from . import opengl
 
@@ -96,6 +96,11 @@ class Camera:
             mujoco.mj_camlight(model, data)  # after the control loop they are one physics step late
             self._renderer.update_scene(data, camera=name or self._view, scene_option=self._options)
             return self._renderer.render()
+
+    def refresh(self) -> None:
+        """Take over textures that have changed."""
+        with self._lock:
+            self._renderer.refresh()
 
     def geoms(self, name: str | None = None) -> NDArray[np.int32]:
         """Number of the geom that each pixel shows, shape (height, width); -1 for none. Cameras as in `take`."""
@@ -259,9 +264,7 @@ def _lowest_fixed(world: World) -> float:
 
 def things(world: World) -> list[int]:
     """All geoms of the scene without table and floor."""
-    model = world.model
-    apart = {model.body(name).id for name in ("world", "table", *(names.base for names in arms(model)))}
-    return [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] not in apart]
+    return scene_geoms(world.model)
 
 
 def box_of(world: World, geom: int, scale: float = 1.0) -> NDArray[np.float64]:

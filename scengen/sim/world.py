@@ -387,3 +387,9 @@ class World:
     def row(self, name: str) -> int:
         """Row of the loop's contact tables for a name as in `touching`."""
         return self._labels[name] if name in self._labels else self.body(name)
+
+
+def scene_geoms(model: mujoco.MjModel) -> list[int]:
+    """All geoms of a compiled scene without robot, table and floor."""
+    apart = {model.body(name).id for name in ("world", "table", *(names.base for names in panda.arms(model)))}
+    return [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] not in apart]
