@@ -33,7 +33,7 @@ HALF_LEG = 0.025
 """Half the thickness of a leg [m]."""
 INSET = 0.04
 """Distance of the middles of the legs from the edges of the table [m]."""
-WALLS = (((-1.9, 0.0), (1.0, 0.0)), ((0.0, 2.6), (0.0, -1.0)), ((0.0, -2.6), (0.0, 1.0)), ((3.0, 0.0), (-1.0, 0.0)))
+WALLS = (((-1.9, 0.0), (1.0, 0.0)), ((0.0, 3.0), (0.0, -1.0)), ((0.0, -3.0), (0.0, 1.0)), ((3.0, 0.0), (-1.0, 0.0)))
 """Place [m] of each wall and its direction inwards. Cameras of the table are inside; from outside walls are clear."""
 ROOM_HEIGHT = 3.4
 """Height of the walls [m]."""

@@ -14,7 +14,8 @@ from ..look.looks import ROOM
 from ..orientation import Orientation
 from ..perturb.effects import PICTURES
 from ..perturb.perturbation import LEVELS, Drawn, Kind, Perturbation, affects, stream_kind
-from ..pictures.render import Camera, Picture, things
+from ..pictures.render import Camera, Picture
+from ..pictures.views import things
 from ..scenario import Scenario
 from ..sim.world import World
 
