@@ -87,11 +87,15 @@ def _cover(geom: mujoco.MjsGeom, finish: Finish, rgba: Rgba | None) -> Finish:
 
 
 def _add_leg(spec: mujoco.MjSpec, x: float, y: float) -> Finish:
-    """Add a leg to the table. `x` and `y` are signs."""
-    table, top = spec.body("table"), spec.geom("table_top").size
-    leg, half = _visual(table, mujoco.mjtGeom.mjGEOM_BOX), (table.pos[2] - top[2]) / 2
+    """Add a leg below the table. `x` and `y` are signs.
+
+    It is part of the world: a further geom of the table would have its contacts found in another way, which changes
+    bits.
+    """
+    table, top = spec.body("table").pos, spec.geom("table_top").size
+    leg, half = _visual(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX), (table[2] - top[2]) / 2
     leg.size = np.array([HALF_LEG, HALF_LEG, half])
-    leg.pos = np.array([x * (top[0] - INSET), y * (top[1] - INSET), -top[2] - half])
+    leg.pos = np.array([table[0] + x * (top[0] - INSET), table[1] + y * (top[1] - INSET), half])
     return _cover(leg, WOOD, LEG_COLOUR)
 
 

@@ -21,7 +21,7 @@ from ..robots.panda import arms
 from ..sim.world import World
 from ..work.machine import free_address_space
 from . import opengl
-from .views import VIEWS, Directions, State, clearest
+from .views import SHOWN_GROUPS, VIEWS, Directions, State, clearest
 
 Picture = NDArray[np.uint8]
 """Shape (height, width, 3), RGB."""
@@ -68,7 +68,7 @@ class Camera:
         self._aspect = width / height
         self._view = view
         self._options = mujoco.MjvOption()
-        self._options.geomgroup[:] = [1, 1, 1, 0, 0, 0]
+        self._options.geomgroup[:] = SHOWN_GROUPS
         self._options.sitegroup[:] = 0
         hide_hulls(world.model)
 

@@ -43,6 +43,8 @@ CORNER_SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 """Signs of the corners of a box, shape (8, 3)."""
 CORNER_SHRINKAGE = 0.8
 """Scale of the boxes whose corners must be visible: the corners of the full boxes touch neighbouring things."""
+SHOWN_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
+"""Groups of geoms that pictures show."""
 RAY_STEP = 1e-6
 """Distance behind a transparent surface at which a ray continues, as a share of the ray."""
 
@@ -80,7 +82,7 @@ def clearest(world: World, aspect: float, states: Sequence[State] = (), directio
 
     It contains the initial position of the hand, the hand whenever it is near a thing, and the things of the scene in
     all states, unless they fall off the table. A thing that is hidden in more than `MAX_HIDDEN` of the states counts
-    against a view.
+    against a view, unless no view shows it.
 
     Args:
         aspect: width of the picture over its height.
@@ -92,8 +94,8 @@ def clearest(world: World, aspect: float, states: Sequence[State] = (), directio
     points = points[points[:, 2] > min(TABLE_TOP - FALL_DEPTH, _lowest_fixed(world))]
     views = [fitted(world, aspect, *where, points) for where in directions]
     shares = np.array([[visible_shares(world, view) for view in views] for _ in _visit(world, states)])
-    hidden = (shares < HIDDEN).mean(axis=0) - MAX_HIDDEN
-    quality = shares.mean(axis=(0, 2)) - hidden.clip(0.0).max(axis=1)
+    hidden = ((shares < HIDDEN).mean(axis=0) - MAX_HIDDEN).clip(0.0)
+    quality = shares.mean(axis=(0, 2)) - (hidden - hidden.min(axis=0)).max(axis=1)
     best = int(quality.argmax())
     return views[best if quality[best] > quality[0] + MIN_GAIN else 0]
 
@@ -138,7 +140,7 @@ def _is_visible(world: World, eye: Vec3, point: Vec3, body: int) -> bool:
     model, hit = world.model, np.array([-1], np.int32)
     while True:
         ahead = point - eye
-        share = mujoco.mj_ray(model, world.data, eye, ahead, None, 1, -1, hit, None)
+        share = mujoco.mj_ray(model, world.data, eye, ahead, SHOWN_GROUPS, 1, -1, hit, None)
         if not 0 <= share < 1 or model.geom_bodyid[hit[0]] == body:
             return True
         material = model.geom_matid[hit[0]]
