@@ -16,6 +16,7 @@ from scipy.ndimage import gaussian_filter
 
 from ..assets.prop import TABLE_TOP
 from ..geometry import Vec3, rotation
+from ..look.room import WALL_NAMES
 
 Values = Mapping[str, float | Sequence[float]]
 """Drawn values of a perturbation in an episode, by name, as they are stored."""
@@ -122,8 +123,9 @@ def _tint(strength: float, rng: Random) -> Values:
 
 
 def _contrast(model: mujoco.MjModel, values: Values) -> None:
-    """Move light from everywhere to the light that casts shadows, or back."""
+    """Move light from everywhere, that of fills included, to the light that casts shadows, or back."""
     shift = float(np.asarray(values["shift"]))
+    model.light_diffuse[~model.light_castshadow.astype(bool)] *= 1.0 - shift
     model.vis.headlight.ambient[:] = np.clip(model.vis.headlight.ambient * (1.0 - shift), 0.0, 1.0)
     model.vis.headlight.diffuse[:] = np.clip(model.vis.headlight.diffuse * (1.0 - shift), 0.0, 1.0)
     model.light_diffuse[_key(model)] *= 1.0 + 0.6 * shift
@@ -141,9 +143,13 @@ def _blended(rgb: NDArray[np.float64], values: Values) -> NDArray[np.float64]:
     return (1.0 - share) * rgb + share * np.asarray(values["colour"], float)
 
 
-def _paint(geom: str) -> Callable[[mujoco.MjModel, Values], None]:
+def _paint(*names: str) -> Callable[[mujoco.MjModel, Values], None]:
+    """Change the colours of those of some geoms that the scene has; their textures stay."""
+
     def change(model: mujoco.MjModel, values: Values) -> None:
-        model.geom(geom).rgba[:3] = _blended(np.asarray(model.geom(geom).rgba[:3], float), values)
+        for geom in (model.geom(number) for number in range(model.ngeom)):
+            if geom.name in names:
+                geom.rgba[:3] = _blended(np.asarray(geom.rgba[:3], float), values)
 
     return change
 
@@ -272,7 +278,7 @@ EFFECTS: Mapping[str, Effect] = {
     "ambient": Effect(_brighter, on_model=_scale("head_ambient")),
     "shadow": Effect(lambda strength, rng: {"shift": strength}, on_model=_contrast),
     "table_colour": Effect(_colour, on_model=_paint("table_top")),
-    "floor_colour": Effect(_colour, cameras=FIXED, on_model=_paint("floor")),
+    "floor_colour": Effect(_colour, cameras=FIXED, on_model=_paint("floor", *WALL_NAMES)),
     "camera_position": Effect(_shift, cameras=FIXED, on_model=_move_cameras(FIXED)),
     "camera_angle": Effect(_turn, cameras=FIXED, on_model=_move_cameras(FIXED)),
     "camera_fov": Effect(_zoom, on_model=_move_cameras(EVERY)),
