@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from scengen import list_tasks, load_task
-from scengen.pictures.film import LOOKS, Take, strip
+from scengen.pictures.film import FRAMED, Take, strip
 from scengen.pictures.render import Camera, Picture, camera
 from scengen.samplers.split import ID
 from scengen.validate.certify import certify
@@ -126,7 +126,7 @@ def film(name: str) -> list[Picture]:
     """Pictures of the witness of training scenario 0 of a task, at equal times."""
     take = witness(name)
     with closing(Camera(take.world(), *FILM_SIZE)) as eye:
-        eye.look([eye.world.state() for _ in take.moments(eye.world, take.even(LOOKS))])
+        eye.frame([eye.world.state() for _ in take.moments(eye.world, take.even(FRAMED))])
         return [eye.take() for _ in take.moments(eye.world, take.even(FILM_FRAMES))]
 
 

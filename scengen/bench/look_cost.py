@@ -1,4 +1,4 @@
-"""Costs of the room beside the plain look: of a picture, and of a scenario from its text to its first picture."""
+"""Costs of the room relative to the plain look: of a picture, and of the start of a scenario."""
 
 import time
 from collections.abc import Iterator

@@ -60,7 +60,7 @@ def alternated(
     A first repetition, which compiles code and fills caches, does not count.
 
     Args:
-        clock: processor time of this thread, or `time.process_time` for work that OpenGL does in threads of its own.
+        clock: processor time of this thread, or `time.process_time` that of all threads, which OpenGL needs.
     """
     found = []
     for _ in range(repeats + 1):

@@ -1,6 +1,6 @@
-"""Finishes: what surfaces of things are made of, as their colours and the names of their parts tell.
+"""Finishes: what surfaces of things are made of, as their colours and the names of their parts show.
 
-A finish depends on what plain pictures show as well, never on a mass or a friction: it tells nothing that is hidden.
+A finish depends on what plain pictures show as well, never on a mass or a friction: it reveals nothing that is hidden.
 """
 
 import re
@@ -52,9 +52,9 @@ CERAMIC = Finish("look_ceramic", 0.5, 0.8)
 CARD = Finish("look_card", 0.05, 0.1, 0.0, textures.fibres, 0.15)
 """Cardboard."""
 MAT = Finish("look_mat", 0.0, 0.0, 0.12, textures.weave)
-"""Woven mat with a hem. A little light of its own keeps its colour in the shade of a hand."""
+"""Woven mat with a hem. It emits a little light, so that its colour is seen in the shade of a hand."""
 MARKED = Finish("look_marked", 0.0, 0.0, 0.08, textures.outline)
-"""Square with an outline, which has a little light of its own."""
+"""Square with an outline. It emits a little light."""
 PRINT = Finish("look_print")
 """Ink and paper."""
 GLASS = Finish("look_glass", 0.8, 0.9)

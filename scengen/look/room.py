@@ -33,8 +33,10 @@ HALF_LEG = 0.025
 """Half the thickness of a leg [m]."""
 INSET = 0.04
 """Distance of the middles of the legs from the edges of the table [m]."""
-WALLS = (((-1.9, 0.0), (1.0, 0.0)), ((0.0, 2.6), (0.0, -1.0)), ((0.0, -2.6), (0.0, 1.0)), ((3.0, 0.0), (-1.0, 0.0)))
+WALLS = (((-1.9, 0.0), (1.0, 0.0)), ((0.0, 3.0), (0.0, -1.0)), ((0.0, -3.0), (0.0, 1.0)), ((3.0, 0.0), (-1.0, 0.0)))
 """Place [m] of each wall and its direction inwards. Cameras of the table are inside; from outside walls are clear."""
+WALL_NAMES = tuple(f"look_wall_{number}" for number in range(len(WALLS)))
+"""Names of the walls."""
 ROOM_HEIGHT = 3.4
 """Height of the walls [m]."""
 WALL_LENGTH = 6.0
@@ -66,7 +68,7 @@ def dress(spec: mujoco.MjSpec) -> None:
     surfaces = [geom for geom in spec.geoms if not geom.material and geom.group < HIDDEN_GROUP]
     finishes = {_cover(geom, *_surface(geom)) for geom in surfaces}
     finishes |= {_add_leg(spec, x, y) for x, y in itertools.product((-1.0, 1.0), repeat=2)}
-    finishes |= {_add_wall(spec, place, inwards) for place, inwards in WALLS}
+    finishes |= {_add_wall(spec, name, *wall) for name, wall in zip(WALL_NAMES, WALLS, strict=True)}
     for finish in sorted(finishes, key=lambda finish: finish.name):
         finish.add(spec)
     _light(spec)
@@ -87,15 +89,19 @@ def _cover(geom: mujoco.MjsGeom, finish: Finish, rgba: Rgba | None) -> Finish:
 
 
 def _add_leg(spec: mujoco.MjSpec, x: float, y: float) -> Finish:
-    """Add a leg to the table. `x` and `y` are signs."""
-    table, top = spec.body("table"), spec.geom("table_top").size
-    leg, half = _visual(table, mujoco.mjtGeom.mjGEOM_BOX), (table.pos[2] - top[2]) / 2
+    """Add a leg below the table. `x` and `y` are signs.
+
+    It is part of the world: a further geom of the table would have its contacts found in another way, which changes
+    bits.
+    """
+    table, top = spec.body("table").pos, spec.geom("table_top").size
+    leg, half = _visual(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX), (table[2] - top[2]) / 2
     leg.size = np.array([HALF_LEG, HALF_LEG, half])
-    leg.pos = np.array([x * (top[0] - INSET), y * (top[1] - INSET), -top[2] - half])
+    leg.pos = np.array([table[0] + x * (top[0] - INSET), table[1] + y * (top[1] - INSET), half])
     return _cover(leg, WOOD, LEG_COLOUR)
 
 
-def _add_wall(spec: mujoco.MjSpec, place: tuple[float, float], inwards: tuple[float, float]) -> Finish:
+def _add_wall(spec: mujoco.MjSpec, name: str, place: tuple[float, float], inwards: tuple[float, float]) -> Finish:
     """Add a wall: a plane with its x axis up and its z axis inwards."""
     wall, up, normal, turn = (
         _visual(spec.worldbody, mujoco.mjtGeom.mjGEOM_PLANE),
@@ -105,6 +111,7 @@ def _add_wall(spec: mujoco.MjSpec, place: tuple[float, float], inwards: tuple[fl
     )
     normal[:2] = inwards
     mujoco.mju_mat2Quat(turn, np.stack([up, np.cross(normal, up), normal], axis=1).ravel())
+    wall.name = name
     wall.size, wall.quat = np.array([ROOM_HEIGHT / 2, WALL_LENGTH / 2, 1.0]), turn
     wall.pos = np.array([*place, ROOM_HEIGHT / 2])
     return _cover(wall, PLASTER, WALL_COLOUR)

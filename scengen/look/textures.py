@@ -1,4 +1,4 @@
-"""Textures made of numbers: square tiles that repeat without a seam, each from a seed of its own.
+"""Textures made of numbers: square tiles that repeat without a seam, each from a separate seed.
 
 They multiply the colour of what carries them, so that a thing keeps the colour that its scene gives it.
 """

@@ -18,7 +18,8 @@ from ..perturb.effects import LANGUAGE, PICTURES
 from ..perturb.kinds import LEVELS, Kind, affects, stream_kind
 from ..perturb.language import Words, leaks, other_words
 from ..perturb.perturbation import Perturbation
-from ..pictures.render import Camera, Picture, things
+from ..pictures.render import Camera, Picture
+from ..pictures.views import things
 from ..scenario import Scenario
 from ..sim.world import World
 

@@ -17,7 +17,7 @@ from scipy.ndimage import gaussian_filter
 from ..assets.prop import TABLE_TOP
 from ..geometry import Vec3, rotation
 from ..look.looks import LOOKS, ROOM
-from ..look.room import PLASTER, TABLE
+from ..look.room import TABLE, WALL_NAMES
 from .distractors import put
 from .language import CLAUSES, WORDINGS, Words, extended, worded
 
@@ -142,8 +142,9 @@ def _tint(strength: float, rng: Random) -> Values:
 
 
 def _contrast(model: mujoco.MjModel, values: Values) -> None:
-    """Move light from everywhere to the light that casts shadows, or back."""
+    """Move light from everywhere, that of fills included, to the light that casts shadows, or back."""
     shift = float(np.asarray(values["shift"]))
+    model.light_diffuse[~model.light_castshadow.astype(bool)] *= 1.0 - shift
     model.vis.headlight.ambient[:] = np.clip(model.vis.headlight.ambient * (1.0 - shift), 0.0, 1.0)
     model.vis.headlight.diffuse[:] = np.clip(model.vis.headlight.diffuse * (1.0 - shift), 0.0, 1.0)
     model.light_diffuse[_key(model)] *= 1.0 + 0.6 * shift
@@ -161,20 +162,13 @@ def _blended(rgb: NDArray[np.float64], values: Values) -> NDArray[np.float64]:
     return (1.0 - share) * rgb + share * np.asarray(values["colour"], float)
 
 
-def _paint(geom: str) -> Callable[[mujoco.MjModel, Values], None]:
-    def change(model: mujoco.MjModel, values: Values) -> None:
-        model.geom(geom).rgba[:3] = _blended(np.asarray(model.geom(geom).rgba[:3], float), values)
-
-    return change
-
-
-def _colour_of(material: str) -> Callable[[mujoco.MjModel, Values], None]:
-    """Blend the colours of all geoms of a material that a look has given."""
+def _paint(*names: str) -> Callable[[mujoco.MjModel, Values], None]:
+    """Change the colours of those of some geoms that the scene has; their textures stay."""
 
     def change(model: mujoco.MjModel, values: Values) -> None:
-        made = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL, material)
-        for geom in np.flatnonzero(model.geom_matid == made) if made >= 0 else ():
-            model.geom_rgba[geom, :3] = _blended(np.asarray(model.geom_rgba[geom, :3], float), values)
+        for geom in (model.geom(number) for number in range(model.ngeom)):
+            if geom.name in names:
+                geom.rgba[:3] = _blended(np.asarray(geom.rgba[:3], float), values)
 
     return change
 
@@ -365,8 +359,7 @@ EFFECTS: Mapping[str, Effect] = {
     "ambient": Effect(_brighter, on_model=_scale("head_ambient")),
     "shadow": Effect(_value("shift"), on_model=_contrast, varies=False),
     "table_colour": Effect(_colour, on_model=_paint("table_top")),
-    "floor_colour": Effect(_colour, cameras=FIXED, on_model=_paint("floor")),
-    "wall_colour": Effect(_colour, cameras=FIXED, on_model=_colour_of(PLASTER.name), looks=ROOM_ONLY),
+    "room_colour": Effect(_colour, cameras=FIXED, on_model=_paint("floor", *WALL_NAMES)),
     "table_texture": Effect(_pattern, on_model=_print_table, looks=ROOM_ONLY),
     "distractors": Effect(
         lambda strength, rng: {"number": strength, "key": int(rng.integers(2**31))},

@@ -23,12 +23,13 @@ from ..validate.rollout import Rollout, try_shortcut
 from ..work.targets import appearing
 from .render import Camera, Picture, address, check_pictures
 from .video import Movie
+from .views import VIEWS, Directions
 
 WITNESS = "witness"
 """Name of the actions of the witness, in place of a shortcut's."""
 COLUMNS = 4
 """Number of pictures in a row of a strip."""
-LOOKS = 8
+FRAMED = 12
 """Number of moments of a video over which the clearest view is chosen."""
 Progress = Callable[[int, int], None]
 """Function that gets the number of finished pictures and the number of all."""
@@ -44,6 +45,8 @@ class Take:
     actions: Actions
     rules: Rules = field(default=STRICT, kw_only=True)
     look: Look = field(default=ROOM, kw_only=True)
+    directions: Directions = field(default=VIEWS, kw_only=True)
+    """Directions of the views to choose from."""
 
     @classmethod
     def witness(cls, row: PoolRow, scenario: Scenario) -> "Take":
@@ -171,7 +174,7 @@ def strip(
     with closing(Camera(take.world(), width, height)) as eye:
         moments = [(eye.world.state(), caption) for caption in take.moments(eye.world, take.even(frames))]
         if camera is None:
-            eye.look([state for state, _ in moments])
+            eye.frame([state for state, _ in moments], take.directions)
         ways = take.ways
         for state, caption in moments:
             eye.world.restore(state)
@@ -269,7 +272,7 @@ def _frames(take: Take, eye: Camera, fps: int, camera: str | None, progress: Pro
     """Pictures of a take, `fps` per second."""
     periods = range(0, len(take.actions) + 1, periods_between(fps))
     if camera is None:
-        eye.look([eye.world.state() for _ in take.moments(eye.world, take.even(LOOKS))])
+        eye.frame([eye.world.state() for _ in take.moments(eye.world, take.even(FRAMED))], take.directions)
     for number, _ in enumerate(take.moments(eye.world, periods), 1):
         yield eye.take(camera)
         progress(number, len(periods))

@@ -4,6 +4,7 @@ import jinja2
 
 from ..validate.playable import check_scene
 from . import render
+from .views import VIEWS, Directions
 
 LARGEST_PAGE = 19_000_000
 """Largest size of the scenarios on a page [characters]. The whole page is then below 20 MB, which browsers open at
@@ -16,8 +17,13 @@ def template(name: str) -> jinja2.Template:
     return jinja2.Environment(loader=loader, autoescape=True).get_template(name)
 
 
-def thumbnail(scene_xml: str, embodiment: str) -> str:
-    """A picture of the start of a scenario, as a data address for HTML."""
+def thumbnail(scene_xml: str, embodiment: str, directions: Directions = VIEWS) -> str:
+    """A picture of the start of a scenario, as a data address for HTML.
+
+    Args:
+        directions: those of the views to choose from.
+    """
     check_scene(scene_xml, embodiment)
     with render.camera(scene_xml, embodiment) as view:
+        view.frame(directions=directions)
         return render.address(render.encode(view.take()), "webp")

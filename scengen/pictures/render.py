@@ -2,12 +2,9 @@
 
 import base64
 import io
-import itertools
-import math
 import os
 import sys
 import threading
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NoReturn
@@ -18,19 +15,16 @@ from mujoco import MjvCamera, gl_context
 from numpy.typing import NDArray
 from PIL import Image
 
-from ..assets.prop import TABLE_TOP
 from ..errors import ScengenError, UnknownName
-from ..geometry import Vec3
 from ..look.looks import ROOM, Look, look_of
 from ..robots.panda import arms
-from ..sim.world import World, scene_geoms
+from ..sim.world import World
 from ..work.machine import free_address_space
 from . import opengl
+from .views import SHOWN_GROUPS, VIEWS, Directions, State, clearest
 
 Picture = NDArray[np.uint8]
 """Shape (height, width, 3), RGB."""
-State = NDArray[np.float64]
-"""State of a world, see `World.state`."""
 
 MIN_ADDRESS_SPACE = 2.5e9
 """Address space that a process needs for its first picture [bytes]: OpenGL in software takes 2.2 GB, most of it for the
@@ -48,7 +42,7 @@ class Camera:
         raise TypeError("a Camera holds a context of OpenGL and cannot be copied or pickled; make a new Camera(world)")
 
     def __init__(self, world: World, width: int = 320, height: int = 240, view: MjvCamera | None = None):
-        """Start with a view, by default the fitted one of the scene from the direction that hides least of it.
+        """Start with a view, by default that of `clearest` at the first picture that names no camera.
 
         Args:
             width: width of the pictures [pixels], at most `opengl.LARGEST_EDGE`.
@@ -72,15 +66,21 @@ class Camera:
                 "libosmesa6, and set MUJOCO_GL=egl or osmesa"
             ) from None
         self._aspect = width / height
-        self._view = clearest(world, self._aspect) if view is None else view
+        self._view = view
         self._options = mujoco.MjvOption()
-        self._options.geomgroup[:] = [1, 1, 1, 0, 0, 0]
+        self._options.geomgroup[:] = SHOWN_GROUPS
         self._options.sitegroup[:] = 0
         hide_hulls(world.model)
 
-    def look(self, states: Sequence[State]) -> None:
+    def frame(self, states: Sequence[State] = (), directions: Directions = VIEWS) -> None:
         """Choose the view that hides least over several states of the world, which ends in the last one."""
-        self._view = clearest(self.world, self._aspect, states)
+        self._view = clearest(self.world, self._aspect, states, directions)
+
+    def _eye(self, name: str | None) -> str | MjvCamera:
+        """A named camera, or the view."""
+        if name is None and self._view is None:
+            self.frame()
+        return name or self._view  # type: ignore[return-value]
 
     def take(self, name: str | None = None) -> Picture:
         """A picture of the present world, from a named camera or in the view that was chosen last.
@@ -91,10 +91,10 @@ class Camera:
         cameras = [self.world.model.camera(i).name for i in range(self.world.model.ncam)]
         if name is not None and name not in cameras:
             raise UnknownName("camera", name, cameras)
-        model, data = self.world.model, self.world.data
+        model, data, eye = self.world.model, self.world.data, self._eye(name)
         with self._lock:
             mujoco.mj_camlight(model, data)  # after the control loop they are one physics step late
-            self._renderer.update_scene(data, camera=name or self._view, scene_option=self._options)
+            self._renderer.update_scene(data, camera=eye, scene_option=self._options)
             return self._renderer.render()
 
     def refresh(self) -> None:
@@ -104,10 +104,11 @@ class Camera:
 
     def geoms(self, name: str | None = None) -> NDArray[np.int32]:
         """Number of the geom that each pixel shows, shape (height, width); -1 for none. Cameras as in `take`."""
+        eye = self._eye(name)
         with self._lock:
             self._renderer.enable_segmentation_rendering()
             try:
-                self._renderer.update_scene(self.world.data, camera=name or self._view, scene_option=self._options)
+                self._renderer.update_scene(self.world.data, camera=eye, scene_option=self._options)
                 shown = self._renderer.render()
             finally:
                 self._renderer.disable_segmentation_rendering()
@@ -118,32 +119,9 @@ class Camera:
         geoms = self.geoms(name)
         return np.where(geoms >= 0, self.world.model.geom_bodyid[geoms], -1)
 
-    def look_by(self, view: MjvCamera) -> None:
-        """Choose a view."""
-        self._view = view
-
     def close(self) -> None:
         with self._lock:
             self._renderer.close()
-
-
-VIEWS = ((140.0, -28.0), (220.0, -28.0), (180.0, -35.0), (100.0, -28.0), (260.0, -28.0), (140.0, -55.0), (220.0, -55.0))
-"""Azimuths and elevations of the fitted views [deg]. The first looks from the free corner of the table to the robot, so
-that the arm hides little."""
-MIN_GAIN = 0.05
-"""Smallest share of the scene by which another view must show more than the first one to be chosen."""
-DISTANCE_MARGIN = 1.12
-"""Factor on the smallest distance at which the fitted view holds all points."""
-CLOSEST = 0.55
-"""Smallest distance of the fitted view [m]: a closer one would not show where on the table things are."""
-FALL_DEPTH = 0.1
-"""Depth below the table top at which things are not followed [m], unless a fixed body is as low."""
-CORNER_SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-"""Signs of the corners of a box, shape (8, 3)."""
-CORNER_SHRINKAGE = 0.8
-"""Scale of the boxes whose corners must be visible: the corners of the full boxes touch neighbouring things."""
-RAY_STEP = 1e-6
-"""Distance behind a transparent surface at which a ray continues, as a share of the ray."""
 
 
 def hide_hulls(model: mujoco.MjModel) -> None:
@@ -151,127 +129,6 @@ def hide_hulls(model: mujoco.MjModel) -> None:
     robots = np.isin(model.body_rootid, [model.body(names.base).id for names in arms(model)])
     hulls = robots[model.geom_bodyid] & (model.geom_group == 0)
     model.geom_rgba[hulls, 3] = 0.0
-
-
-def fitted(
-    world: World,
-    aspect: float,
-    azimuth: float = VIEWS[0][0],
-    elevation: float = VIEWS[0][1],
-    points: NDArray[np.float64] | None = None,
-) -> MjvCamera:
-    """The closest view that contains the things of the scene and the robot's hand, but not all of table and floor.
-
-    Args:
-        aspect: width of the picture over its height.
-        azimuth, elevation: direction of the view [deg].
-        points: points that it must contain instead, shape (n, 3) [m].
-    """
-    view = MjvCamera()
-    view.azimuth, view.elevation = azimuth, elevation
-    ahead, right, up = view_axes(view)
-    axes = np.array([right, up, ahead])
-    seen = (scene_corners(world) if points is None else points) @ axes.T
-    centre = (seen.min(axis=0) + seen.max(axis=0)) / 2
-    away = seen - centre
-    half = np.tan(np.radians(world.model.vis.global_.fovy) / 2)
-    needed = np.abs(away[:, :2]) / [half * aspect, half]  # at this distance from the eye a point is on the rim
-    view.lookat = axes.T @ centre
-    view.distance = max(CLOSEST, DISTANCE_MARGIN * float((needed.max(axis=1) - away[:, 2]).max()))
-    return view
-
-
-def clearest(world: World, aspect: float, states: Sequence[State] = ()) -> MjvCamera:
-    """The view in which the robot and other things hide least of the scene.
-
-    It contains the initial position of the hand, and the things of the scene in all states, unless they fall off the
-    table.
-
-    Args:
-        aspect: width of the picture over its height.
-        states: states of the world. Default: the present one. The world ends in the last one.
-    """
-    corners = [
-        scene_corners(world) if number == 0 else _thing_corners(world) for number, _ in enumerate(_visit(world, states))
-    ]
-    points = np.vstack(corners)
-    points = points[points[:, 2] > min(TABLE_TOP - FALL_DEPTH, _lowest_fixed(world))]
-    views = [fitted(world, aspect, *where, points) for where in VIEWS]
-    shares = np.array([[visible_share(world, view) for view in views] for _ in _visit(world, states)]).mean(axis=0)
-    best = int(shares.argmax())
-    return views[best if shares[best] > shares[0] + MIN_GAIN else 0]
-
-
-def _visit(world: World, states: Sequence[State]) -> Iterator[None]:
-    """Bring the world into one state after the other. Without states it stays as it is."""
-    if not states:
-        yield
-    for state in states:
-        world.restore(state)
-        yield
-
-
-def view_axes(view: MjvCamera) -> tuple[Vec3, Vec3, Vec3]:
-    """Unit vectors ahead, right and up of a view."""
-    turn, dip = np.radians(view.azimuth), np.radians(view.elevation)
-    ahead = np.array([np.cos(dip) * np.cos(turn), np.cos(dip) * np.sin(turn), np.sin(dip)])
-    right = np.array([np.sin(turn), -np.cos(turn), 0.0])
-    return ahead, right, np.cross(right, ahead)
-
-
-def visible_share(world: World, view: MjvCamera) -> float:
-    """Visible share of the corners of the boxes around the geoms of a body, averaged over bodies.
-
-    Transparent things hide nothing.
-    """
-    eye = view.lookat - view.distance * view_axes(view)[0]
-    visible = defaultdict(list)
-    for geom in things(world):
-        body = world.model.geom_bodyid[geom]
-        visible[body] += [_is_visible(world, eye, corner, body) for corner in box_of(world, geom, CORNER_SHRINKAGE)]
-    return float(np.mean([np.mean(each) for each in visible.values()]))
-
-
-def _is_visible(world: World, eye: Vec3, point: Vec3, body: int) -> bool:
-    """Whether no opaque thing is between the eye and a point, apart from the body of the point."""
-    model, hit = world.model, np.array([-1], np.int32)
-    while True:
-        ahead = point - eye
-        share = mujoco.mj_ray(model, world.data, eye, ahead, None, 1, -1, hit, None)
-        if not 0 <= share < 1 or model.geom_bodyid[hit[0]] == body:
-            return True
-        material = model.geom_matid[hit[0]]
-        if (model.geom_rgba[hit[0], 3] if material < 0 else model.mat_rgba[material, 3]) == 1.0:
-            return False
-        eye = eye + (share + RAY_STEP) * ahead
-
-
-def scene_corners(world: World) -> NDArray[np.float64]:
-    """Corners of the boxes around the geoms of all things, and the hands, shape (n, 3) [m]."""
-    return np.vstack([_thing_corners(world), *(arm.hand for arm in world.arms)])
-
-
-def _thing_corners(world: World) -> NDArray[np.float64]:
-    """Corners of the boxes around the geoms of all things, shape (n, 3) [m]."""
-    return np.vstack([box_of(world, geom) for geom in things(world)])
-
-
-def _lowest_fixed(world: World) -> float:
-    """Height of a millimetre below all fixed things of the scene [m]; inf if there are none."""
-    fixed = [geom for geom in things(world) if world.model.body_weldid[world.model.geom_bodyid[geom]] == 0]
-    return min((float(box_of(world, geom)[:, 2].min()) for geom in fixed), default=math.inf) - 0.001
-
-
-def things(world: World) -> list[int]:
-    """All geoms of the scene without table and floor."""
-    return scene_geoms(world.model)
-
-
-def box_of(world: World, geom: int, scale: float = 1.0) -> NDArray[np.float64]:
-    """Corners of the box around a geom, scaled about its middle, shape (8, 3) [m]."""
-    centre, half = world.model.geom_aabb[geom].reshape(2, 3)
-    frame = world.data.geom_xmat[geom].reshape(3, 3)
-    return world.data.geom_xpos[geom] + (centre + scale * half * CORNER_SIGNS) @ frame.T
 
 
 def check_pictures() -> None:

@@ -1,24 +1,23 @@
 """The contact sheet: pictures of the scenarios of pools, next to their training twins, in one HTML file."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
 from markupsafe import Markup
 
 from ..certificate import STAGES
-from ..errors import ScengenError
 from ..pool import Pool, PoolRow
 from ..samplers.axis import spell
-from ..samplers.split import ID
 from ..samplers.task import Task
 from ..validate.playable import check_row
-from ..validate.rebuilt import rebuild
 from ..work.targets import write
 from . import film, render
 from .page import LARGEST_PAGE, template, thumbnail
-from .twins import DIRECTIONS, pair
+from .shared_view import directions_of, twin_scene
+from .twins import pair
+from .views import VIEWS, Directions
 
 STRIP = (8, 240, 180)
 """Number of pictures of a film strip, and width and height of each [pixels]."""
@@ -67,7 +66,7 @@ def contact_sheet(
     """Write one HTML file that shows the scenes of some pools. Returns a remark, or an empty text.
 
     Without OpenGL the page has no pictures and a remark about it. For every pool it gives the number of its scenarios
-    that are shown. All pairs of a pool are seen from one direction.
+    that are shown. All pictures of a pool are seen from one direction.
 
     Args:
         pools: pools, each with its task as it was when the pool was made.
@@ -81,17 +80,19 @@ def contact_sheet(
     remark, sections, figure = "", list[Section](), template("contact_sheet_figure.html")
     total, size = sum(min(images, len(pool)) for pool, _ in pools), 0
     for number_of_pool, (pool, task) in enumerate(pools):
-        section, directions = Section(pool, task, [], []), DIRECTIONS
+        section, directions = Section(pool, task, [], []), VIEWS
         share = (LARGEST_PAGE - size) // (len(pools) - number_of_pool)
         for row in islice(pool.rows(), images):
             entry = SheetEntry(row, [moved(task, name, value) for name, value in row.shifted.items()])
             if not remark:
                 try:
+                    if not section.figures:
+                        directions = directions_of(pool, task)
                     if row.shifted:
-                        entry.twin, entry.picture, directions = pair(row, twin_scene(pool, task, row), directions)
+                        entry.twin, entry.picture = pair(row, twin_scene(pool, task, row), directions)[:2]
                     else:
-                        entry.picture = thumbnail(row.scene_xml, row.embodiment)
-                    entry.strip = _strip(task, row) if films else ""
+                        entry.picture = thumbnail(row.scene_xml, row.embodiment, directions)
+                    entry.strip = _strip(task, row, directions) if films else ""
                 except render.NoPictures as error:
                     remark = str(error)
             section.checks.extend([] if section.checks else entry.checks)
@@ -109,24 +110,9 @@ def contact_sheet(
     return remark
 
 
-def twin_scene(pool: Pool, task: Task, row: PoolRow) -> str:
-    """The scene of a scenario's training twin, made again from its seed and index.
-
-    Raises:
-        ScengenError: the family has changed since, so that it is another scenario.
-    """
-    trained = task.draw(ID, row.seed, row.index, task.design(pool.manifest.config.sampler)).scenario
-    if trained.id != row.id_twin:
-        raise ScengenError(
-            f"{row.id}: its training twin is now {trained.id}, but the pool has {row.id_twin}; the family has changed "
-            "since then, see scengen verify"
-        )
-    return rebuild(trained)
-
-
-def _strip(task: Task, row: PoolRow) -> str:
+def _strip(task: Task, row: PoolRow, directions: Directions) -> str:
     """Film strip of the witness."""
-    take = film.Take.witness(check_row(row), task.scenario(row.params))
+    take = replace(film.Take.witness(check_row(row), task.scenario(row.params)), directions=directions)
     return render.address(render.encode(film.strip(take, *STRIP)), "webp")
 
 

@@ -12,22 +12,9 @@ from ..look.looks import ROOM
 from ..pool.row import SceneRow
 from ..sim.world import World
 from ..validate.playable import check_scene, stored_world
-from .render import (
-    Camera,
-    Picture,
-    address,
-    box_of,
-    check_pictures,
-    encode,
-    fitted,
-    scene_corners,
-    things,
-    view_axes,
-    visible_share,
-)
+from .render import Camera, Picture, address, check_pictures, encode
+from .views import Directions, box_of, fitted, scene_corners, things, view_axes, visible_share
 
-Directions = Sequence[tuple[float, float]]
-"""Azimuths and elevations of views [deg]."""
 DIRECTIONS: Directions = ((180.0, -35.0), (180.0, -60.0), (90.0, -30.0), (270.0, -30.0))
 """Directions of the views. They look along the edges of the table: from its corner, what training
 has parallel to an edge would look oblique, and what an axis has oblique would look parallel."""

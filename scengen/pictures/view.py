@@ -15,7 +15,8 @@ from ..pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
 from .film import Take
-from .render import fitted, hide_hulls
+from .render import hide_hulls
+from .views import fitted
 
 
 class NoDisplay(ScengenError):

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 import viser
 
-from ..pictures.render import clearest, view_axes
+from ..pictures.views import clearest, view_axes
 from ..sim.world import World
 from ..studio.player import FRAME_TIME
 from ..studio.scene import Film, SceneView

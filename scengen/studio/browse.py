@@ -12,7 +12,8 @@ from ..geometry import Vec3
 from ..look.looks import PLAIN
 from ..pictures import film
 from ..pictures.page import template
-from ..pictures.sheet import moved, twin_scene
+from ..pictures.shared_view import twin_scene
+from ..pictures.sheet import moved
 from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..sim.world import World

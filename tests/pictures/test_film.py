@@ -15,7 +15,7 @@ from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.envs.observations import CAMERAS
 from scengen.look.looks import PLAIN
 from scengen.means import MISSED, SHOWN
-from scengen.pictures import film, render
+from scengen.pictures import film, render, views
 from scengen.pictures.view import view
 from scengen.pool import Pool
 from scengen.scenario import Shortcut
@@ -64,9 +64,9 @@ def test_the_default_view_holds_everything_that_stands_on_the_table(task):
             points += [data.geom_xpos[geom] + frame @ (box[:3] + box[3:] * signs) for signs in CORNERS]
     assert len(points) > 8
     for aspect in (4 / 3, 1.0):
-        eye = render.fitted(world, aspect)
+        eye = views.fitted(world, aspect)
         seen = np.abs(on_screen(world, eye, np.array(points), aspect)).max()
-        assert seen < 1.0 and (seen > 0.8 or eye.distance == render.CLOSEST)
+        assert seen < 1.0 and (seen > 0.8 or eye.distance == views.CLOSEST)
 
 
 @drawing
@@ -119,14 +119,14 @@ def test_a_caption_is_written_into_the_lower_left_corner():
 @pytest.mark.parametrize(("opacity", "hidden"), [(1.0, True), (0.3, False)])
 def test_the_clearest_view_sees_past_a_wall(opacity, hidden):
     """A cube with a wall between it and the first view; a transparent wall hides nothing."""
-    turn = np.radians(render.VIEWS[0][0])
+    turn = np.radians(views.VIEWS[0][0])
     scene = table()
     place(scene, Cube(), "cube", [0.0, 0.0, TABLE_TOP])
     between = -0.1 * np.array([np.cos(turn), np.sin(turn)])
     wall = Domino(height=0.2, width=0.1, rgba=(0.5, 0.5, 0.5, opacity))
     place(scene, wall, "wall", [*between, TABLE_TOP], turn, free=False)
     world = World.load(scene_text.emit(scene)[0])
-    first, best = render.fitted(world, 1.0), render.clearest(world, 1.0)
+    first, best = views.fitted(world, 1.0), views.clearest(world, 1.0)
     assert ((best.azimuth, best.elevation) != (first.azimuth, first.elevation)) == hidden
 
 
@@ -150,16 +150,16 @@ def test_on_the_floor_only_what_stands_fast_is_in_the_view(free):
     place(scene, Cube(), "low", [0.3, 0.7, 0.0], free=free)
     world = World.load(scene_text.emit(scene)[0])
     low = world.com("low") + 0.025 * CORNERS
-    seen = np.abs(on_screen(world, render.clearest(world, 1.0), low, 1.0)).max() <= 1.0
+    seen = np.abs(on_screen(world, views.clearest(world, 1.0), low, 1.0)).max() <= 1.0
     assert seen == (not free)
 
 
 def test_the_view_is_chosen_over_all_states(row, scenario):
     """Of states that are all the start it is the view of the start; the world is left in the last of them."""
     world = World.load(row.scene_xml)
-    start, at_start = world.state(), render.clearest(world, 1.0)
+    start, at_start = world.state(), views.clearest(world, 1.0)
     world.step_filtered(row.witness[0])
-    chosen = render.clearest(world, 1.0, [world.state(), start])
+    chosen = views.clearest(world, 1.0, [world.state(), start])
     assert (world.state() == start).all() and chosen.elevation == at_start.elevation
 
 

@@ -21,7 +21,8 @@ from scengen.evaluate.policies import make_policy
 from scengen.look.finish import OF_COLOURS, OF_PARTS
 from scengen.look.looks import LOOKS, PLAIN, ROOM, look_named, look_of, look_told
 from scengen.perturb.perturbation import arrays
-from scengen.pictures.render import Camera, things
+from scengen.pictures.render import Camera
+from scengen.pictures.views import things
 from scengen.pool import Pool
 from scengen.sim.embodiment import compose
 from scengen.sim.world import World
@@ -64,7 +65,7 @@ def scene(name):
 
 
 def pixels_by_colour(eye):
-    """Median colour of the things of a scene by their stored colour, from the camera that shows most; and the table's."""
+    """Median colour of things by their stored colour, from the camera that shows most of it; and the table's."""
     model, found = eye.world.model, defaultdict(list)
     kept = [geom for geom in things(eye.world) if model.geom_rgba[geom, 3] == 1.0]
     for view in VIEWS:

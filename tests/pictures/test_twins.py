@@ -10,8 +10,8 @@ from helpers import REFERENCE, pictures_are_possible
 from scengen import load_task
 from scengen.ood.analysis.redraw import task_of
 from scengen.pictures import sheet
-from scengen.pictures.render import VIEWS, fitted
 from scengen.pictures.twins import _motion, _projected, comparison_view
+from scengen.pictures.views import VIEWS, fitted
 from scengen.pool import Pool
 from scengen.samplers.split import ID
 from scengen.validate.rebuilt import world_of

@@ -28,8 +28,9 @@ def command(arguments: Arguments) -> int:
     try_file(settings.to)
     try_file(settings.json)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
-    overviews, contrasts = gather(pools, search_path(arguments))
-    if missing := page(pools, overviews, contrasts, Path(settings.to)):
+    search = search_path(arguments)
+    overviews, contrasts = gather(pools, search)
+    if missing := page(pools, overviews, contrasts, Path(settings.to), search):
         remark(f"the report has no pictures: {missing}")
     if settings.json:
         write_json(settings.json, plain(overviews, contrasts))

@@ -15,6 +15,7 @@ from ...look.looks import look_named
 from ...ood.analysis.redraw import task_of
 from ...pictures.film import WITNESS, Take, movie, periods_between, shortcut, strip
 from ...pictures.render import check_pictures, encode
+from ...pictures.shared_view import directions_of
 from ...pool import Pool
 from ...pool.demonstrations import Demonstrations, is_demonstrations
 from ...pool.directory import Directory
@@ -142,13 +143,14 @@ def _take_of_pool(settings: FilmSettings, arguments: Arguments) -> Take:
     """A take of the witness of a scenario in a pool, or of one of its shortcuts."""
     pool = holder(settings.pool, str(settings.id))
     row = check_row(chosen(pool, str(settings.id)))
-    scenario = task_of(pool, search_path(arguments)).scenario(row.params)
+    task = task_of(pool, search_path(arguments))
+    directions, scenario = directions_of(pool, task), task.scenario(row.params)
     if settings.of == WITNESS:
-        return Take.witness(row, scenario)
+        return replace(Take.witness(row, scenario), directions=directions)
     take, rollout = shortcut(row, scenario, settings.of, settings.raw)
     outcome = f"{rollout.outcome} after {rollout.seconds:g} s{': ' if rollout.reason else ''}{rollout.reason}"
     say(f"{settings.of}: {outcome}")
-    return take
+    return replace(take, directions=directions)
 
 
 def _take_of_hit(settings: FilmSettings, arguments: Arguments) -> Take:

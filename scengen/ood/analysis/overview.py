@@ -14,6 +14,7 @@ from ...errors import Infeasible
 from ...pictures import render
 from ...pictures.page import LARGEST_PAGE, template, thumbnail
 from ...pictures.plots import svg
+from ...pictures.shared_view import directions_of
 from ...pool import Pool
 from ...pool.library import names
 from ...samplers.split import ID
@@ -98,8 +99,17 @@ def gather(pools: Sequence[Pool], search: Sequence[str] = ()) -> tuple[list[Over
     return [_overview(*each, search) for each in held], contrasts
 
 
-def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequence[Contrast], path: Path) -> str:
+def page(
+    pools: Sequence[Pool],
+    overviews: Sequence[Overview],
+    contrasts: Sequence[Contrast],
+    path: Path,
+    search: Sequence[str] = (),
+) -> str:
     """Write the report as one HTML file.
+
+    Args:
+        search: overrides that add folders of other packages, see `task_files.search_path`.
 
     Returns:
         The reason why pictures are missing; empty if none is missing.
@@ -108,8 +118,10 @@ def page(pools: Sequence[Pool], overviews: Sequence[Overview], contrasts: Sequen
     for pool, overview in zip(pools, overviews, strict=True):
         shown: list[str] = []
         try:
-            scenes = itertools.islice(pool.columns("scene_xml", "embodiment"), 0 if remark else SHOWN_SCENES)
-            shown = [thumbnail(*scene) for scene in scenes]
+            if not remark and len(pool):
+                scenes = itertools.islice(pool.columns("scene_xml", "embodiment"), SHOWN_SCENES)
+                directions = directions_of(pool, task_of(pool, search))
+                shown = [thumbnail(*scene, directions) for scene in scenes]
         except render.NoPictures as error:
             remark = str(error)
         plot = svg(figure(overview.histograms)) if overview.histograms else ""
