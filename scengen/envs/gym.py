@@ -30,7 +30,6 @@ from ..look.looks import ROOM, look_named
 from ..orientation import Orientation
 from ..params import Value
 from ..perturb.drawn import Senses
-from ..perturb.language import Words
 from ..perturb.perturbation import Perturbation
 from ..pictures.opengl import check_size
 from ..pictures.render import Camera
@@ -373,12 +372,10 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self.close()
             self._world = stored_world(row, self.perturbation.dressed(self.look) if self._needs_pictures else None)
             self._scenario = self.task.scenario(row.params)
-            model = self._world.model
-            bodies = [model.body(number).name for number in range(model.nbody)] if self.perturbation else ()
-            words = Words.of(row.task, row.instruction, self._search) if self.perturbation.has_words else None
-            self.drawn = self.perturbation.of(row.id, self._perturb_seed, bodies, words)
-            if self._needs_pictures:
-                self.drawn.on_model(model)
+            senses = self.perturbation.senses(
+                self._world.model, row.id, row.task, row.instruction, self._perturb_seed, self._search
+            )
+            self.drawn = senses.drawn
         self._row = row
         self._senses = Senses(self.drawn)
         self._played: list[NDArray[np.float32]] = []

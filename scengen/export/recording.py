@@ -8,6 +8,7 @@ output of the policy, which explains the name. These actions have passed the tel
 environment without a filter. robomimic's data have a row for every control period (`scengen.export.robomimic`).
 """
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -27,6 +28,8 @@ from ..errors import BadConfig, UnknownName
 from ..installation import versions
 from ..look.looks import PLAIN, ROOM, Look, look_named
 from ..orientation import Orientation
+from ..perturb.drawn import Senses
+from ..perturb.perturbation import Perturbation
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
@@ -85,6 +88,9 @@ class RecordSettings:
     width: int = 640
     height: int = 480
     look: str | None = None
+    perturb: str | None = None
+    perturb_seed: int = 0
+    looks: int = 1
     workers: Workers = 1
 
     @cached_property
@@ -104,6 +110,10 @@ class RecordSettings:
         """Look of the pictures, if there are any. By default robosuite's recordings are plain, as its environments."""
         chosen = look_named(self.look or (PLAIN if self.format == ROBOMIMIC else ROOM).name)
         return chosen if self.camera_names else None
+
+    @cached_property
+    def perturbation(self) -> Perturbation:
+        return Perturbation.parse(self.perturb)
 
     @property
     def rate(self) -> int:
@@ -130,8 +140,14 @@ class RecordSettings:
         if self.rates not in (ONE_RATE, NATIVE_RATES):
             raise UnknownName("rates", self.rates, [ONE_RATE, NATIVE_RATES])
         look_named(self.look or ROOM.name)
-        at_least(self, n=1, fps=1, width=2, height=2, workers=1)
+        at_least(self, n=1, fps=1, width=2, height=2, workers=1, looks=1, perturb_seed=0)
         periods_between(self.rate)
+        if self.looks > 1 and not self.perturbation:
+            raise BadConfig(
+                f"looks = {self.looks}; perturb= makes them differ: give it, or leave looks out"
+            )
+        if self.perturbation and self.format == ROBOMIMIC:
+            raise BadConfig(f"perturb = {self.perturb}; robosuite draws its own pictures: use format={LEROBOT}")
         if self.format == ROBOMIMIC:
             check_target(self.to)
             if self.rate != FULL_RATE:
@@ -180,30 +196,41 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
         if name not in (known := cameras_of(robot)):
             raise UnknownName("camera", name, [NONE, *known])
     count = min(count, settings.n or count)
+    count *= settings.looks
     names = sorted({name for pool in pools for name in texts_of(pool, "task", settings.failed)})
     tasks = {name: compose.load_task(name, search) for name in names}
     if settings.format == ROBOMIMIC and len(tasks) > 1:
         raise BadConfig(f"pools of {' and '.join(tasks)}; robomimic's file has one environment: record them separately")
     bodies = (bodies_of(task, scenes_of(pools, name)) for name, task in tasks.items())
     recorded = recorded_streams(robot, list(tasks.values()), bodies, settings.observed, settings.privileged)
+    views = [cameras_of(robot)[name] for name in settings.camera_names]
+    settings.perturbation.check([*recorded.streams], views, settings.shown or ROOM)
     failed, left_out, styles = list[str](), dict[str, str](), Counter[str]()
     with appearing(settings.to, folder=settings.format == LEROBOT) as path:
-        lost = dict(unplayable(rows_of(pools, count, settings.failed), settings.workers))
+        scenarios = count // settings.looks
+        lost = dict(unplayable(rows_of(pools, scenarios, settings.failed), settings.workers))
         with _writer(settings, path, robot, recorded, next(iter(tasks)), tuple(search)) as writer:
-            episodes = rows_of(pools, count, settings.failed), origins_of(pools, count, settings.failed)
-            for row, origin in zip(*episodes, strict=True):
+            episodes = rows_of(pools, scenarios, settings.failed), origins_of(pools, scenarios, settings.failed)
+            looks = range(settings.perturb_seed, settings.perturb_seed + settings.looks)
+            for (row, origin), seed in itertools.product(zip(*episodes, strict=True), looks):
                 if row.id in lost:
                     left_out[str(row.name)] = lost[row.id]
                     continue
                 with ExitStack() as stack:
-                    world = stored_world(row, settings.shown)
-                    scenario = tasks[row.task].scenario(row.params)
-                    pictures = _camera(stack, world, settings, cameras_of(row.embodiment), scenario.orientation)
-                    recorded.playing.orientation = scenario.orientation
-                    observe = partial(Snapshot.of, world, writer.streams, pictures)
-                    sample = partial(read, world, writer.streams) if settings.rates == NATIVE_RATES else None
+                    shown = settings.shown and settings.perturbation.dressed(settings.shown)
+                    world, scenario = stored_world(row, shown), tasks[row.task].scenario(row.params)
+                    held, kept = scenario.orientation, {"perturb": str(settings.perturbation), "perturb_seed": seed}
+                    calibrations = _calibrations(settings, world, row.embodiment, held)
+                    senses = settings.perturbation.senses(world.model, row.id, row.task, row.instruction, seed, search)
+                    world.reset()
+                    pictures = _camera(stack, world, settings, cameras_of(row.embodiment), held, senses)
+                    recorded.playing.orientation = held
+                    observe = partial(Snapshot.of, world, writer.streams, pictures, senses)
+                    sample = partial(read, world, writer.streams, senses) if settings.rates == NATIVE_RATES else None
                     periods, rules = periods_between(settings.rate), check_rules(origin.get("rules", STRICT))
-                    replay = WitnessReplay(row, scenario, world, periods, observe, sample, rules)
+                    told = senses.drawn.instruction or row.instruction
+                    replay = WitnessReplay(row, scenario, world, periods, observe, sample, rules, calibrations, told)
+                    origin = {**origin, **kept} if settings.perturbation else origin
                     if not writer.episode(replay, origin) and replay.promised:
                         failed.append(str(row.name))
                 if isinstance(row, DemonstrationRow):
@@ -243,7 +270,7 @@ class Writer(Protocol):
         """Add one scenario's episode, and return whether it reached the goal.
 
         Args:
-            origin: source, operator and rules of a demonstration.
+            origin: source, operator and rules of a demonstration; what is perturbed.
         """
         ...
 
@@ -284,10 +311,8 @@ class _LeRobotWriter(DatasetWriter):
 
     def episode(self, replay: WitnessReplay, origin: Mapping[str, str]) -> bool:
         row, success = replay.row, False
-        size, views = (self.settings.width, self.settings.height), cameras_of(row.embodiment)
-        for name in self.settings.camera_names:
-            held = replay.scenario.orientation
-            self.calibrate(name, calibration(replay.world, views[name], *size, held), str(row.name))
+        for name, found in replay.calibrations.items():
+            self.calibrate(name, found, str(row.name))
         for dataset_row in replay.rows():
             self.add(_values(dataset_row, proprioception(row.embodiment)), dataset_row.observed.pictures)
             success = dataset_row.success
@@ -303,7 +328,7 @@ class _LeRobotWriter(DatasetWriter):
         model = replay.world.model
         present = {model.body(i).name for i in range(model.nbody)}
         absent = ",".join(body for body in self._bodies if body not in present)
-        self.end_episode(row.instruction, {**told, "scengen/absent": absent, "scengen/success": success})
+        self.end_episode(replay.instruction, {**told, "scengen/absent": absent, "scengen/success": success})
         return success
 
     def finish(self, source: Mapping[str, Any]) -> None:
@@ -335,8 +360,21 @@ def _values(row: DatasetRow, state: Sequence[str]) -> dict[str, Any]:
     }
 
 
+def _calibrations(
+    settings: RecordSettings, world: World, robot: str, held: Orientation
+) -> dict[str, Mapping[str, Any]]:
+    """Calibration of each camera where it is supposed to stand, by the paper's name."""
+    size, views = (settings.width, settings.height), cameras_of(robot)
+    return {name: calibration(world, views[name], *size, held) for name in settings.camera_names}
+
+
 def _camera(
-    stack: ExitStack, world: World, settings: RecordSettings, views: Mapping[str, str], held: Orientation
+    stack: ExitStack,
+    world: World,
+    settings: RecordSettings,
+    views: Mapping[str, str],
+    held: Orientation,
+    senses: Senses,
 ) -> Callable[[], dict[str, Picture]]:
     """Function that takes the pictures of a moment, by the paper's names, in the orientation that policies see.
 
@@ -350,7 +388,14 @@ def _camera(
     held.check_size(settings.width, settings.height)
     camera = Camera(world, settings.width, settings.height)
     stack.callback(camera.close)
-    return lambda: {name: held.apply(camera.take(views[name])) for name in settings.camera_names}
+
+    def pictures() -> dict[str, Picture]:
+        taken = {name: held.apply(camera.take(views[name])) for name in settings.camera_names}
+        if not senses.drawn.values:
+            return taken
+        return {name: senses.picture(views[name], world.time, one.copy()) for name, one in taken.items()}
+
+    return pictures
 
 
 def _features(settings: RecordSettings, robot: str, streams: Mapping[str, Stream]) -> dict[str, Feature]:

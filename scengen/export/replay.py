@@ -1,7 +1,7 @@
 """Replay a witness and yield the rows of a data set."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from ..control.loop import ACTION
 from ..control.teleop import MOTION
 from ..envs.observations import Stream
 from ..episode import STRICT, Actions, Episode, Rules
+from ..perturb.drawn import Senses
 from ..pictures.render import Picture
 from ..pool.row import DemonstrationRow, SceneRow
 from ..scenario import Scenario
@@ -30,10 +31,16 @@ class Snapshot:
     """Time, `qpos` and `qvel` in one vector: robosuite's flattened state."""
 
     @classmethod
-    def of(cls, world: World, streams: Mapping[str, Stream], pictures: Callable[[], dict[str, Picture]]) -> "Snapshot":
+    def of(
+        cls,
+        world: World,
+        streams: Mapping[str, Stream],
+        pictures: Callable[[], dict[str, Picture]],
+        senses: Senses | None = None,
+    ) -> "Snapshot":
         """The present moment of a world. `pictures` takes its pictures."""
         data = world.data
-        return cls(read(world, streams), pictures(), np.concatenate([[data.time], data.qpos, data.qvel]))
+        return cls(read(world, streams, senses), pictures(), np.concatenate([[data.time], data.qpos, data.qvel]))
 
 
 def asks_for_motion(action: NDArray[Any]) -> NDArray[np.bool_]:
@@ -42,9 +49,12 @@ def asks_for_motion(action: NDArray[Any]) -> NDArray[np.bool_]:
     return np.abs(arms[..., :MOTION]).max(axis=-1) > MOVING_ACTION
 
 
-def read(world: World, streams: Mapping[str, Stream]) -> dict[str, NDArray[np.float32]]:
-    """The present readings of some streams."""
-    return {name: stream.read(world).astype(np.float32) for name, stream in streams.items()}
+def read(world: World, streams: Mapping[str, Stream], senses: Senses | None = None) -> dict[str, NDArray[np.float32]]:
+    """The present readings of some streams, as they are perceived."""
+    found = {name: stream.read(world) for name, stream in streams.items()}
+    if senses is not None:
+        found = {n: senses.reading(n, streams[n].entries(n), world.time, value) for n, value in found.items()}
+    return {name: value.astype(np.float32) for name, value in found.items()}
 
 
 @dataclass(frozen=True)
@@ -89,6 +99,10 @@ class WitnessReplay:
     """Function that reads the streams in every control period."""
     rules: Rules = STRICT
     """Rules of the episode."""
+    calibrations: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
+    """Calibration of each recorded camera, by the paper's name."""
+    instruction: str = ""
+    """The instruction as it is given."""
 
     @property
     def promised(self) -> bool:

@@ -8,10 +8,12 @@ farther in the same direction.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import mujoco
+
 from ..errors import BadConfig
 from ..look.looks import ROOM, Look
 from .distractors import with_spares
-from .drawn import Drawn, random
+from .drawn import Drawn, Senses, random
 from .effects import LANGUAGE, PICTURES
 from .kinds import LEVELS, affects, kind_of, kinds, stream_kind
 from .language import WORDINGS, Words
@@ -89,6 +91,24 @@ class Perturbation:
                 what = f"streams of {effect.reads}, and none is observed: observe one"
             if not seen:
                 raise BadConfig(f"perturb = {name}@{level} affects {what}")
+
+    def senses(
+        self, model: mujoco.MjModel, scenario: str, task: str, instruction: str, seed: int, search: Sequence[str] = ()
+    ) -> Senses:
+        """What is perceived of a scenario, whose compiled scene is changed for it.
+
+        Args:
+            scenario: its id.
+            task: name of its task.
+            instruction: the instruction of the task.
+            seed: another number draws another perturbation.
+            search: folders of other packages, see `task_files.search_path`.
+        """
+        bodies = [model.body(number).name for number in range(model.nbody)] if self else ()
+        words = Words.of(task, instruction, search) if self.has_words else None
+        senses = Senses(self.of(scenario, seed, bodies, words))
+        senses.drawn.on_model(model)
+        return senses
 
     def of(self, scenario: str, seed: int = 0, bodies: Iterable[str] = (), words: Words | None = None) -> "Drawn":
         """What is drawn for a scenario.

@@ -21,10 +21,11 @@ MAX_SETTINGS = {
     "limit": 1_000_000_000,
     "limit_mb": 1_000_000,
     "limit_seconds": 86_400,  # a day
+    "looks": 1000,
     "minutes": 100_000,
     "n": 1_000_000,
     "permutations": 1_000_000,
-    "perturb_seed": 2**63 - 1,
+    "perturb_seed": 2**62,
     "played": 1000,
     "repeats": 1000,
     "rollouts": 1_000_000,

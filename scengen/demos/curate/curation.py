@@ -156,6 +156,7 @@ def _examined(
                         recording.calibrations,
                         frozen,
                         recording.look,
+                        search,
                     )
                 )
         else:

@@ -23,12 +23,15 @@ DRAWN = ("id", "shifted", "id_twin", "params")
 """Columns that follow from split, seed and index."""
 
 
-def wrong_labels(stored: Mapping[str, Any], task: Task, scenario: Scenario, text: str) -> Iterator[Finding]:
+def wrong_labels(
+    stored: Mapping[str, Any], task: Task, scenario: Scenario, text: str, instruction: str | None = None
+) -> Iterator[Finding]:
     """Findings about the columns of an episode.
 
     Args:
         stored: row of the table of episodes.
         text: scene that is built from the parameters.
+        instruction: the instruction as a perturbation words it; None if it is the task's own.
     """
     for name in EPISODE_COLUMNS:
         if f"scengen/{name}" not in stored:
@@ -37,7 +40,7 @@ def wrong_labels(stored: Mapping[str, Any], task: Task, scenario: Scenario, text
     for name, here in made.items():
         if plain_value(here) != (there := stored.get(f"scengen/{name}")):
             yield label(name, f"is {ascii(there)[:60]}, not {ascii(here)[:60]}")
-    yield from _differences(stored, task)
+    yield from _differences(stored, task, instruction)
     yield from _wrongly_drawn(stored, task)
 
 
@@ -66,9 +69,9 @@ def _axes(stored: Mapping[str, Any]) -> Any:
         return ()
 
 
-def _differences(stored: Mapping[str, Any], task: Task) -> Iterator[Finding]:
+def _differences(stored: Mapping[str, Any], task: Task, instruction: str | None) -> Iterator[Finding]:
     """Differences from the installed task: the recording may be of one that a command line has changed."""
-    installed = {"tasks": [task.instruction], "scengen/horizon": task.horizon, "scengen/rules": STRICT}
+    installed = {"tasks": [instruction or task.instruction], "scengen/horizon": task.horizon, "scengen/rules": STRICT}
     installed[TASK_VERSION] = task.version
     for name, here in installed.items():
         if (there := stored.get(name, here)) != here:

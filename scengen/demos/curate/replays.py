@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...control.loop import ACTION
-from ...envs.object_state import ObjectState, bodies_of
-from ...envs.observations import cameras_of, privileged, streams_of
+from ...envs.object_state import NAME, ObjectState, bodies_of
+from ...envs.observations import Stream, cameras_of, privileged, streams_of
 from ...episode import Episode, Outcome, Rules
 from ...errors import ScengenError
 from ...export.cameras import calibration
@@ -20,6 +20,8 @@ from ...export.lerobot import IMAGES_PREFIX, INDEX_FEATURES
 from ...export.recording import CONTROL_ACTIONS, STATE
 from ...export.streams import ENVIRONMENT
 from ...look.looks import Look
+from ...perturb.drawn import Senses
+from ...perturb.perturbation import Perturbation
 from ...pictures.render import Camera, NoPictures, Picture
 from ...samplers.task import Task
 from ...scenario import Scenario
@@ -73,6 +75,8 @@ class Recorded:
     and if there is none."""
     look: Look
     """Look of the pictures."""
+    search: tuple[str, ...] = ()
+    """Folders of other packages, see `task_files.search_path`."""
 
     @classmethod
     def of(
@@ -87,6 +91,7 @@ class Recorded:
         cameras: Mapping[str, Mapping[str, Any]],
         frozen: Mapping[str, Finding],
         look: Look,
+        search: Sequence[str] = (),
     ) -> "Recorded":
         """The parts of an episode that a replay compares.
 
@@ -102,28 +107,38 @@ class Recorded:
         told = {name: value for name, value in about.items() if not name.startswith("stats/")}
         params, horizon = json.loads(about["scengen/params"]), float(about["scengen/horizon"])
         actions, rows = columns[CONTROL_ACTIONS], (states, results, told, tuple(entries))
-        return cls(number, task, params, horizon, rules_of(about), actions, *rows, size, films, cameras, frozen, look)
+        shown = size, films, cameras, frozen, look, tuple(search)
+        return cls(number, task, params, horizon, rules_of(about), actions, *rows, *shown)
 
     @property
     def bodies(self) -> list[str]:
         """Bodies of the environment state."""
         return bodies_in(self.entries)
 
-    def readers(self, scenario: Scenario, text: str) -> dict[str, Callable[[World], NDArray[Any]]]:
-        """Functions that read the streams from a world, of those that are known.
+    def readers(self, scenario: Scenario, text: str, senses: Senses) -> dict[str, Callable[[World], NDArray[Any]]]:
+        """Functions that read the streams from a world as they are perceived, of those that are known.
 
         Args:
             text: scene of the scenario.
         """
         robot = self.task.embodiment
-        found: dict[str, Callable[[World], NDArray[Any]]] = {n: stream.read for n, stream in streams_of(robot).items()}
+        found: dict[str, Stream] = {**streams_of(robot)}
         if not {*self.streams} <= {*found, ENVIRONMENT}:
             state = ObjectState(bodies_of(self.task, [text]), len(hands(robot)))
             of_bodies = privileged(state, type(scenario), lambda: scenario.orientation)
-            found |= {name: stream.read for name, stream in of_bodies.items()}
+            found |= of_bodies
         if self.entries:
-            found[ENVIRONMENT] = state_of(self.entries, robot).read
-        return {name: read for name, read in found.items() if name in self.streams}
+            state = state_of(self.entries, robot)
+            found[ENVIRONMENT] = Stream(state.names, state.bounds, state.read)
+        return {name: _perceived(name, stream, senses) for name, stream in found.items() if name in self.streams}
+
+
+def _perceived(name: str, stream: Stream, senses: Senses) -> Callable[[World], NDArray[Any]]:
+    """Function that reads a stream from a world as it is perceived."""
+    if not senses.drawn.values:
+        return stream.read
+    known = NAME if name == ENVIRONMENT else name
+    return lambda world: senses.reading(known, stream.entries(known), world.time, stream.read(world))
 
 
 def bodies_in(entries: Sequence[str]) -> list[str]:
@@ -180,18 +195,23 @@ def _replayed(recorded: Recorded) -> Replayed:
     task = recorded.task
     scenario, robot = task.scenario(recorded.params), task.embodiment
     text = rebuild(scenario)
-    labels = tuple(wrong_labels(recorded.told, task, scenario, text))
-    found = _played(recorded, scenario, World.load(text, robot, recorded.look if recorded.films else None), text)
-    return replace(found, findings=(*labels, *found.findings))
+    perturbation = Perturbation.parse(str(recorded.told.get("scengen/perturb", "")))
+    world = World.load(text, robot, perturbation.dressed(recorded.look) if recorded.films else None)
+    cameras = tuple(_wrong_cameras(recorded, scenario, world))
+    seed = int(recorded.told.get("scengen/perturb_seed", 0))
+    senses = perturbation.senses(world.model, scenario.id, task.name, task.instruction, seed, recorded.search)
+    world.reset()
+    labels = tuple(wrong_labels(recorded.told, task, scenario, text, senses.drawn.instruction))
+    found = _played(recorded, scenario, world, text, senses)
+    return replace(found, findings=(*labels, *cameras, *found.findings))
 
 
-def _played(recorded: Recorded, scenario: Scenario, world: World, text: str) -> Replayed:
-    robot, readers = recorded.task.embodiment, recorded.readers(scenario, text)
+def _played(recorded: Recorded, scenario: Scenario, world: World, text: str, senses: Senses) -> Replayed:
+    robot, readers = recorded.task.embodiment, recorded.readers(scenario, text, senses)
     if recorded.actions.shape[2] != ACTION * len(hands(robot)):
         return _fault(recorded, f"the actions are not those of {robot}")
     with ExitStack() as stack:
-        cameras = tuple(_wrong_cameras(recorded, scenario, world))
-        films = _Films(recorded, scenario, world, stack)
+        films = _Films(recorded, scenario, world, stack, senses)
         episode, over = Episode(scenario, world, recorded.horizon, recorded.rules), None
         seconds = 0.0
         for row, actions in enumerate(recorded.actions):
@@ -212,7 +232,7 @@ def _played(recorded: Recorded, scenario: Scenario, world: World, text: str) -> 
     if episode.outcome != "success":
         return _fault(recorded, f"replayed, the goal is not reached: {episode.reason or 'no outcome'}")
     ways = (Finding("MEANS", "warning", (), {}, episode.reason),) if episode.lacks else ()
-    return Replayed((*films.findings, *labels, *cameras, *ways), ("replay", *films.checks), unknown)
+    return Replayed((*films.findings, *labels, *ways), ("replay", *films.checks), unknown)
 
 
 def _wrong_cameras(recorded: Recorded, scenario: Scenario, world: World) -> Iterator[Finding]:
@@ -254,8 +274,8 @@ def _wrong_results(recorded: Recorded, row: int, over: Outcome | None) -> str:
 class _Films:
     """The films of an episode compared with pictures of its replay. Without OpenGL none is compared."""
 
-    def __init__(self, recorded: Recorded, scenario: Scenario, world: World, stack: ExitStack):
-        self._held, self._camera = scenario.orientation, None
+    def __init__(self, recorded: Recorded, scenario: Scenario, world: World, stack: ExitStack, senses: Senses):
+        self._held, self._camera, self._world, self._senses = scenario.orientation, None, world, senses
         self._probes: dict[tuple[str, int], Probe] = {}
         self._differences: dict[str, list[NDArray[np.float64]]] = {}
         self._frozen, self._ends = recorded.frozen, dict[str, list[Picture]]()
@@ -270,11 +290,14 @@ class _Films:
     def compare(self, row: int) -> None:
         """Render the pictures of a row again, if it is one of those to be compared."""
         for key in self._differences:
-            probe, frozen = self._probes.get((key, row)), self._frozen.get(key)
-            if probe is None and (frozen is None or row not in frozen.frames):
+            probe, frozen, drawn = self._probes.get((key, row)), self._frozen.get(key), self._senses.drawn
+            if probe is None and (frozen is None or row not in frozen.frames) and not drawn.delay:
                 continue
             assert self._camera is not None
-            picture = self._held.apply(self._camera.take(self._views[key.removeprefix(IMAGES_PREFIX)]))
+            view = self._views[key.removeprefix(IMAGES_PREFIX)]
+            picture = self._held.apply(self._camera.take(view)).copy()
+            if drawn.values:
+                picture = self._senses.picture(view, self._world.time, picture)
             if probe:
                 self._differences[key].append(probe.differences(picture))
             if frozen and row in frozen.frames:
