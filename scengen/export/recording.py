@@ -143,9 +143,7 @@ class RecordSettings:
         at_least(self, n=1, fps=1, width=2, height=2, workers=1, looks=1, perturb_seed=0)
         periods_between(self.rate)
         if self.looks > 1 and not self.perturbation:
-            raise BadConfig(
-                f"looks = {self.looks}; perturb= makes them differ: give it, or leave looks out"
-            )
+            raise BadConfig(f"looks = {self.looks}; perturb= makes them differ: give it, or leave looks out")
         if self.perturbation and self.format == ROBOMIMIC:
             raise BadConfig(f"perturb = {self.perturb}; robosuite draws its own pictures: use format={LEROBOT}")
         if self.format == ROBOMIMIC:

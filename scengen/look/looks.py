@@ -45,7 +45,11 @@ class Look:
         spec.add_text(name=MARK, data=self.name)
 
 
-PLAIN = Look("plain", 1, lambda spec: None, 1024, 1024)
+def _leave(spec: mujoco.MjSpec) -> None:
+    """Leave a scene as it is."""
+
+
+PLAIN = Look("plain", 1, _leave, 1024, 1024)
 """The scene as it is stored, in a void."""
 ROOM = Look("room", 1, room.dress, 768, 2048, smooth_shadows=True)
 """A table in a room."""

@@ -22,15 +22,18 @@ from ..pictures.render import Camera, Picture
 from ..pictures.views import things
 from ..scenario import Scenario
 from ..sim.world import World
+from .distance import distance
 
 SIZE = 128
 """Edge of the pictures that are compared [pixels]."""
 MOMENTS = 4
 """Number of moments of the witness at which pictures and readings are compared, from the start to the end."""
-MIN_CHANGE = 1.0
-"""Least mean difference of a picture, over pixels and channels, in the moment at which it is largest [grey levels]."""
+MIN_CHANGE = 0.005
+"""Least `distance` of a picture from the clean one, in the moment at which it is largest."""
 MIN_READING_CHANGE = 1e-4
 """Least largest difference of a reading, in the moment at which it is largest [m, rad, N]."""
+DRAWS = 64
+"""Number of scenarios over which draws are compared."""
 CLEARANCE = 0.005
 """Least distance of distractors from all that moves in the witness [m]."""
 SWEEP = 5
@@ -82,6 +85,19 @@ class Proof:
             yield f"the text names {name}"
         if self.is_crossed:
             yield "a distractor is in the way"
+
+
+def faults_of_draws(kind: Kind) -> Iterator[str]:
+    """What is wrong with the draws of a kind over `DRAWS` scenarios: all alike, or to one side only."""
+    every = [Perturbation(((kind.name, LEVELS),)).of(f"scenario {n}").plain()[kind.name] for n in range(DRAWS)]
+    if kind.effect.varies and len({*map(str, every)}) == 1:
+        yield "all scenarios have the same draw"
+    middles = {"way": 0.0, "turn": 0.0, "factor": 1.0, "fovy": 1.0}
+    for name in every[0].keys() & middles.keys():
+        parts = np.array([each[name] for each in every]).reshape(DRAWS, -1) - middles[name]
+        parts = parts[:, np.abs(parts).max(axis=0) > 0]
+        if ((parts > 0).all(axis=0) | (parts < 0).all(axis=0)).any():
+            yield f"{name} is drawn to one side only"
 
 
 class Stage:
@@ -172,11 +188,11 @@ class Stage:
         return Proof(neutral, changes, leaks=tuple(leaks(text, given, self.secrets)))
 
     def _far(self, drawn: Drawn, name: str, period: int, picture: Picture, clean: Picture) -> float:
-        """Mean difference of a camera's picture from the clean one; of passing ones the mean over some periods."""
+        """Distance of a camera's picture from the clean one; of passing ones the mean over some periods."""
         passing = any(effect.is_passing for effect in drawn.effects.values())
         periods = range(period, period + (PASSING if passing else 1))
         found = (drawn.on_picture(picture, self.cameras[name], each) for each in periods)
-        return float(np.mean([np.abs(one.astype(float) - clean).mean() for one in found]))
+        return float(np.mean([distance(one, clean) for one in found]))
 
     def _played(self) -> tuple[list[NDArray[np.float64]], str]:
         """States of the witness from the start on, one for each control period, and the hash of the last one."""

@@ -13,7 +13,10 @@ from scengen.compose import load_task
 from scengen.envs.gym import PoolEnv
 from scengen.envs.vector import PoolVectorEnv
 from scengen.errors import BadConfig, UnknownName
-from scengen.measures.proofs import Stage
+from scengen.measures.measurement import Job
+from scengen.measures.perturbations import Proofs
+from scengen.measures.proofs import Stage, faults_of_draws
+from scengen.perturb.distractors import visible
 from scengen.perturb.drawn import arrays
 from scengen.perturb.effects import EFFECTS, EYE, PICTURES
 from scengen.perturb.kinds import LEVELS, kinds
@@ -168,7 +171,8 @@ def test_episodes_of_an_evaluation_say_what_was_drawn(tmp_path):
 def stage(row):
     scenario = load_task(row.task).scenario(row.params)
     words = Words.of(row.task, row.instruction)
-    with closing(Stage(scenario, row.scene_xml, row.embodiment, row.witness, words)) as made:
+    secrets = ["low_starter"]
+    with closing(Stage(scenario, row.scene_xml, row.embodiment, row.witness, words, secrets)) as made:
         yield made
 
 
@@ -206,6 +210,21 @@ def blind(model, values):
     model.cam_pos[:] += 5.0
 
 
+def move_a_tile(model, values):
+    model.geom_pos[model.body("tile_0").geomadr[0]] += 0.01
+
+
+def collide(model, values):
+    EFFECTS["distractors"].on_model(model, values)
+    model.geom_contype[visible(model)] = 1
+    model.geom_conaffinity[visible(model)] = 1
+
+
+def put_in_the_way(model, values):
+    EFFECTS["distractors"].on_model(model, values)
+    model.geom_pos[visible(model)[0]] = model.body("tile_0").pos
+
+
 FAULTS = {
     "a dead light": ("light_direction", {"on_model": lambda model, values: None}, "changes by 0"),
     "the wrist left out": ("camera_fov", {"on_model": spare_wrist(EFFECTS["camera_fov"].on_model)}, "rgb_gripper_cam"),
@@ -219,6 +238,28 @@ FAULTS = {
         "changes by 0",
     ),
     "nothing that it changes": ("noise", {"reads": "sounds"}, "it changes nothing"),
+    "a frozen texture": ("table_texture", {"on_model": lambda model, values: None}, "changes by 0"),
+    "a field of view that is not applied": ("camera_fov", {"on_model": lambda model, values: None}, "changes by 0"),
+    "noise in one stream of several": (
+        "proprioception_noise",
+        {
+            "on_reading": lambda n, r, v, rng: (
+                EFFECTS["proprioception_noise"].on_reading(n, r, v, rng) if len(r) == 3 else r
+            )
+        },
+        "robot0_joint_pos changes by 0",
+    ),
+    "things that move": ("distractors", {"on_model": move_a_tile}, "the physics differs"),
+    "distractors that collide": ("distractors", {"on_model": collide}, "the physics differs"),
+    "a distractor in the way": ("distractors", {"on_model": put_in_the_way}, "a distractor is in the way"),
+    "a picture that is not late": ("late", {"is_late": False}, "changes by 0"),
+    "frames that never drop": ("dropped", {"on_picture": lambda picture, values, rng: picture}, "changes by 0"),
+    "a text that stays": ("reworded", {"on_text": lambda text, values, words: text}, "instruction changes by 0"),
+    "an axis in the text": (
+        "verbose",
+        {"on_text": lambda text, values, words: f"{text} This is low starter."},
+        "the text names low_starter",
+    ),
 }
 
 
@@ -228,6 +269,33 @@ def test_planted_faults_are_found(stage, monkeypatch, fault):
     name, parts, says = FAULTS[fault]
     told = list(stage.proof(planted(monkeypatch, name, **parts), 3).faults())
     assert any(says in each for each in told), told
+
+
+@pytest.mark.parametrize(
+    ("name", "draw", "says"),
+    [
+        ("camera_angle", lambda strength, rng: {"turn": [strength, 0.0, 0.0]}, "all scenarios have the same draw"),
+        (
+            "camera_position",
+            lambda strength, rng: {"way": [strength * rng.normal(), 0.0, strength * rng.random()]},
+            "way is drawn to one side only",
+        ),
+        ("exposure", lambda strength, rng: {"factor": 1.0 + rng.random()}, "factor is drawn to one side only"),
+    ],
+)
+def test_faults_of_draws_are_found(monkeypatch, name, draw, says):
+    assert not [*faults_of_draws(kinds()[name])]
+    assert says in [*faults_of_draws(planted(monkeypatch, name, draw=draw))]
+
+
+@drawing
+def test_a_level_that_changes_no_more_than_the_one_before_is_found(monkeypatch):
+    task, kept = load_task("domino_single"), kinds()
+    kind = replace(kept["noise"], strengths=(4.0, 8.0, 8.0, 24.0, 36.0))
+    monkeypatch.setattr("scengen.measures.perturbations.kinds", lambda: {"noise": kind})
+    monkeypatch.setattr("scengen.perturb.perturbation.kinds", lambda: {"noise": kind})
+    found = Proofs({"n": 1}).result(Job(task, ("id",), {"n": 1})).rows[0].value["faults"]
+    assert found == {"noise@3": ["it changes more than level 2 in 0% only"]}
 
 
 @drawing

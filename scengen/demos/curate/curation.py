@@ -135,9 +135,8 @@ def _examined(
             frozen = {camera: one for camera, one in told if settings.replay and one.check == FROZEN_CAMERA}
             findings += [one for camera, one in told if frozen.get(camera) is not one]
             made = (*made, *(f"video {camera}" for camera in recording.cameras), "duplicate")
-            content = sha256(
-                np.ascontiguousarray(episode.columns[CONTROL_ACTIONS]).tobytes() + episode.about["scengen/id"].encode()
-            )
+            look = [str(episode.about.get(f"scengen/{name}", "")) for name in ("id", "perturb", "perturb_seed")]
+            content = sha256(np.ascontiguousarray(episode.columns[CONTROL_ACTIONS]).tobytes() + "|".join(look).encode())
             if (twin := twins.setdefault(content, episode.number)) != episode.number:
                 findings.append(found("DUPLICATE", f"it repeats episode {twin}", (), "error", episode=twin))
             if settings.replay:
