@@ -51,6 +51,9 @@ DARK = 64
 SEEN = ("light_", "cam_", "geom_rgba", "mat_", "site_rgba", "tex_", "vis")
 """Beginnings of the names of what pictures alone use in a compiled scene."""
 
+PLACES = ("geom_type", "geom_size", "geom_pos", "geom_quat")
+"""Names of what distractors change of spare geoms besides."""
+
 Ids = Mapping[str, NDArray[np.int32]]
 """Number of the body in each pixel, by camera."""
 
@@ -167,7 +170,7 @@ class Stage:
 
     def _is_spare(self, name: str, rows: NDArray[np.int64]) -> bool:
         """Whether only spare geoms differ in an array."""
-        return name.startswith("geom_") and set(rows.tolist()) <= {*spares(self.world.model)}
+        return name in PLACES and set(rows.tolist()) <= {*spares(self.world.model)}
 
     def _is_crossed(self) -> bool:
         """Whether the witness comes close to a distractor."""

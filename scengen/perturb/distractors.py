@@ -4,7 +4,7 @@ A scene that may have them is compiled with spare geoms, which are invisible, ha
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -28,6 +28,8 @@ EDGE = TABLE_HALF - 0.04
 """Largest coordinate of the middle of a distractor [m]."""
 MARGIN = 0.08
 """Least distance of a distractor from things and other distractors at the start [m]."""
+MOST_MARGIN = 0.16
+"""Largest such distance [m]: things that are higher than `MARGIN` may topple as far as they are high."""
 TRIES = 400
 """Number of places that are tried."""
 
@@ -62,42 +64,54 @@ def put(model: mujoco.MjModel, number: int, key: int) -> None:
         number: how many. Where things leave no place, there are fewer.
         key: seed of their places, shapes and colours.
     """
-    rng, taken, free = np.random.default_rng(key), _taken(model), iter(spares(model)[:number])
-    spare = next(free, None)
+    rng, taken, free = np.random.default_rng(key), _taken(model), spares(model)[:number]
     for _ in range(TRIES):
-        half, yaw = rng.uniform(*HALF, 3), rng.uniform(0.0, np.pi)
-        place, colour, shape = (
-            rng.uniform(-EDGE, EDGE, 2),
-            int(rng.integers(len(COLOURS))),
-            int(rng.integers(len(SHAPES))),
-        )
-        reach = float(np.linalg.norm(half[:2]))
-        if spare is None:
+        half, yaw, place = rng.uniform(*HALF, 3), rng.uniform(0.0, np.pi), rng.uniform(-EDGE, EDGE, 2)
+        colour, shape = COLOURS[int(rng.integers(len(COLOURS)))], SHAPES[int(rng.integers(len(SHAPES)))]
+        if not free:
             return
-        if any(np.linalg.norm(place - other) < reach + radius + MARGIN for other, radius in taken):
+        reach = float(np.linalg.norm(half[:2]))
+        if any(area.distance(place) < reach + area.margin for area in taken):
             continue
-        model.geom_type[spare], model.geom_size[spare] = SHAPES[shape], half
-        if SHAPES[shape] == mujoco.mjtGeom.mjGEOM_CYLINDER:
-            half[2] = half[1]  # radius and half length
-        model.geom_pos[spare] = [*place, TABLE_TOP + half[2]]
+        spare = free.pop(0)
+        if shape == mujoco.mjtGeom.mjGEOM_CYLINDER:
+            half = np.array([half[0], half[1], 0.0])
+        height = half[1] if shape == mujoco.mjtGeom.mjGEOM_CYLINDER else half[2]
+        model.geom_type[spare], model.geom_size[spare] = shape, half
+        model.geom_pos[spare], model.geom_rgba[spare] = [*place, TABLE_TOP + height], [*colour, 1.0]
         model.geom_quat[spare] = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
-        model.geom_rgba[spare] = [*COLOURS[colour], 1.0]
-        taken.append((place, reach))
-        spare = next(free, None)
+        taken.append(_Area(place, half[:2], MARGIN))
 
 
-def _taken(model: mujoco.MjModel) -> list[tuple[NDArray[np.float64], float]]:
-    """Place [m] and radius [m] of each thing above the table at the start, seen from above."""
+@dataclass(frozen=True)
+class _Area:
+    """A rectangle along the edges of the table that something takes, seen from above."""
+
+    middle: NDArray[np.float64]
+    """Its middle [m]."""
+    half: NDArray[np.float64]
+    """Half its edges [m]."""
+    margin: float
+    """Distance that distractors keep [m]."""
+
+    def distance(self, place: NDArray[np.float64]) -> float:
+        """Distance of a place [m]; 0 within."""
+        return float(np.linalg.norm(np.maximum(np.abs(place - self.middle) - self.half, 0.0)))
+
+
+def _taken(model: mujoco.MjModel) -> list[_Area]:
+    """What the things above the table take at the start."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     above = (g for g in scene_geoms(model) if data.geom_xpos[g, 2] + model.geom_rbound[g] > TABLE_TOP)
-    return [(data.geom_xpos[g, :2].copy(), _radius(model, data, g)) for g in above]
+    return [_area(model, data, geom) for geom in above]
 
 
-def _radius(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
-    """Radius of the circle around a geom's box, seen from above [m]."""
+def _area(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> _Area:
+    """What a geom takes. It may topple as far as it is high."""
     half = np.abs(data.geom_xmat[geom].reshape(3, 3)) @ model.geom_aabb[geom, 3:]
-    return float(np.linalg.norm(half[:2]))
+    height = float(data.geom_xpos[geom, 2] + half[2] - TABLE_TOP)
+    return _Area(data.geom_xpos[geom, :2].copy(), half[:2], min(max(height, MARGIN), MOST_MARGIN))
 
 
 def in_the_way(model: mujoco.MjModel, data: mujoco.MjData, moving: Iterable[int], margin: float) -> bool:
