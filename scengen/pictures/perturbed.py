@@ -16,6 +16,11 @@ from .film import Progress, captioned
 from .render import Camera, Picture
 
 
+def shows(kind: Kind, camera: str, look: Look) -> bool:
+    """Whether a single picture of a camera shows a kind."""
+    return affects(kind.effect, camera) and look.name in kind.effect.looks and not kind.effect.is_late
+
+
 def sheet(
     row: PoolRow,
     scenario: Scenario,
@@ -34,7 +39,7 @@ def sheet(
         size: width and height of each picture [pixels].
         seed: seed of the perturbations.
     """
-    shown = [k for k in kinds if affects(k.effect, camera) and look.name in k.effect.looks and not k.effect.is_late]
+    shown = [kind for kind in kinds if shows(kind, camera, look)]
     levels = [Perturbation(((kind.name, level),)) for kind in shown for level in range(1, LEVELS + 1)]
     pictures, world = list[Picture](), stored_world(row, with_spares(look))
     with closing(Camera(world, size, size)) as eye:

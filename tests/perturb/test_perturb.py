@@ -313,6 +313,8 @@ def test_a_sheet_shows_each_level_beside_the_clean_picture(tmp_path, capsys):
     target = tmp_path / "sheet.png"
     words = ["show", "perturb", f"pool={REFERENCE}", "id=8ed4", "perturb=blur+shadow", f"to={target}", "size=32"]
     assert cli.run(words) == 0 and target.stat().st_size > 1000
-    assert "blur: 1.6" in capsys.readouterr().out
+    assert "blur: 1.9" in capsys.readouterr().out
     assert cli.run([*words, "perturb=wrist_camera"]) == 2
     assert "affects wrist cameras" in capsys.readouterr().err
+    assert cli.run([*words, "perturb=foreign"]) == 0 and "foreign@1: Kipp den ersten" in capsys.readouterr().out
+    assert cli.run([*words, "perturb=late"]) == 2 and "a single picture does not" in capsys.readouterr().err

@@ -7,9 +7,11 @@ from ...envs.observations import cameras_of
 from ...errors import BadConfig, UnknownName
 from ...look.looks import look_named
 from ...ood.analysis.redraw import task_of
-from ...perturb.kinds import kind_of, kinds
+from ...perturb.effects import LANGUAGE
+from ...perturb.kinds import LEVELS, kind_of, kinds
+from ...perturb.language import Words
 from ...perturb.perturbation import Perturbation
-from ...pictures.perturbed import sheet
+from ...pictures.perturbed import sheet, shows
 from ...pictures.render import check_pictures, encode
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
@@ -55,12 +57,23 @@ def command(arguments: Arguments) -> int:
         raise UnknownName("camera", settings.camera, cameras)
     camera = cameras[settings.camera]
     for kind in () if every else wanted:
-        Perturbation(((kind.name, 1),)).check((), [camera])
+        if kind.effect.reads == LANGUAGE:
+            continue
+        Perturbation(((kind.name, 1),)).check((), [camera], look)
+        if not shows(kind, camera, look):
+            raise BadConfig(f"perturb = {kind.name}; a single picture does not show it")
+    words = Words.of(row.task, row.instruction, search_path(arguments))
     scenario = task_of(pool, search_path(arguments)).scenario(row.params)
-    with ProgressBar(err, "sheet", 1) as bar:
-        picture = sheet(row, scenario, wanted, camera, look, settings.size, settings.seed, bar.of)
-    write(Path(settings.to), encode(picture, Path(settings.to).suffix[1:]))
+    drawn = [kind for kind in wanted if shows(kind, camera, look)]
+    if drawn:
+        with ProgressBar(err, "sheet", 1) as bar:
+            picture = sheet(row, scenario, drawn, camera, look, settings.size, settings.seed, bar.of)
+        write(Path(settings.to), encode(picture, Path(settings.to).suffix[1:]))
     for kind in wanted:
         say(f"{kind.name}: {', '.join(f'{each:g}' for each in kind.strengths)} {kind.unit}. {kind.why}")
-    say(f"wrote {settings.to}")
+        for level in range(1, LEVELS + 1) if kind.effect.reads == LANGUAGE else ():
+            said = Perturbation(((kind.name, level),)).of(row.id, settings.seed, words=words)
+            say(f"  {kind.name}@{level}: {said.instruction}")
+    if drawn:
+        say(f"wrote {settings.to}")
     return OK
