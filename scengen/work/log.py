@@ -70,7 +70,8 @@ class Log:
         try:
             content = read_plain(self.path, MAX_JOURNAL) if os.path.lexists(self.path) else b""
         except ValueError as error:
-            raise BadConfig(f"{self.path} cannot be continued: {error}; move it aside, or name another folder") from None
+            why = f"cannot be continued: {error}; move it aside, or name another folder"
+            raise BadConfig(f"{self.path} {why}") from None
         size = content.rfind(b"\n") + 1
         try:
             whole = [json.loads(line) for line in content[:size].splitlines()]
