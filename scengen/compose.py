@@ -262,7 +262,7 @@ def _check_override(verb: str, text: str) -> None:
     if override.package is not None:
         raise BadConfig(f"{quoted}: a setting has no package after @; see scengen {verb} --help")
     if override.is_sweep_override():
-        raise BadConfig(f"{quoted} has multiple values; give one, or quote a value with commas: {key}='...'")
+        raise BadConfig(f"{quoted} has multiple values; give one, or quote a value with commas twice: \"{key}='...'\"")
     if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
         raise BadConfig(f"{quoted}: expected hydra.searchpath=[file:///folder], the only setting of Hydra for scengen")
     if override.is_delete() and (name := re.split("[./]", key)[0]) not in (known := _known(verb)):

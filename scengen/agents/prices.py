@@ -38,8 +38,10 @@ def prices(given: str | Sequence[float] | None, model: str, most: float | None) 
     Raises:
         BadConfig, UnknownName: they are not valid, or not in the file, or there is a limit without them.
     """
-    if most is not None and (given is None or not 0 <= most < float("inf")):
-        raise BadConfig(f"max_cost = {most:g}; it must be a number from 0 on, and needs prices=[PROMPT, ANSWER]")
+    if most is not None and not 0 <= most < float("inf"):
+        raise BadConfig(f"max_cost = {most:g}; it must be a number from 0 on")
+    if most is not None and given is None:
+        raise BadConfig(f"max_cost = {most:g} needs prices; give prices=[PROMPT,ANSWER] or prices=FILE")
     if given is None:
         return None
     two: Any = _of_file(given, model) if isinstance(given, str) else given

@@ -96,7 +96,7 @@ class _PoolKeeper:
     def journal(self) -> Journal:
         """The journal, opened by the first rollout."""
         names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "client")
-        identity = {name: getattr(self.settings, name) for name in names}
+        identity = {name: getattr(self.settings, name) for name in (*names, "perturb", "perturb_seed")}
         made = {"pool": self.pool.sha256, "config": asdict(self.config), **identity, **made_with(self.task)}
         return Journal(self.folder, made, DEMONSTRATIONS, DemonstrationRow, "to")
 

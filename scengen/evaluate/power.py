@@ -58,7 +58,7 @@ class PowerAnalysis:
                 raise BadConfig(f"{name} = {getattr(self, name):g}; it must lie in [0, 1]")
         for name in ("significance", "power"):
             if not 0 < getattr(self, name) < 1:
-                raise BadConfig(f"{name} = {getattr(self, name):g}; it must lie between 0 and 1")
+                raise BadConfig(f"{name} = {getattr(self, name):g}; it must lie in (0, 1)")
 
     @property
     def effective(self) -> float:

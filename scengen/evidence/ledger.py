@@ -16,6 +16,7 @@ from typing import Any, Literal, get_args
 
 from ..errors import BadConfig, cut
 from ..samplers import task_files
+from ..work import targets
 from ..work.plain import read_plain
 
 Kind = Literal[
@@ -77,6 +78,13 @@ class Evidence:
         return made_with.items() <= self.made_with.items()
 
 
+_KINDS_OF_VALUES = {
+    **dict.fromkeys(("task", "split", "kind", "draws"), str),
+    **dict.fromkeys(("version", "n"), int),
+    **dict.fromkeys(("value", "made_with"), dict),
+}
+"""Types of the values of a row, as JSON has them."""
+
 _OPENED: ContextVar[tuple[str | None, tuple[str, ...]]] = ContextVar("opened", default=(None, ()))
 """Folder that replaces the ledgers of all tasks, and the overrides that add folders of other packages."""
 
@@ -120,7 +128,7 @@ def read(kind: Kind, task: str) -> list[Evidence]:
         BadConfig: a line of the file is not a row.
     """
     path = folder_of(task) / kind / f"{task}.jsonl"
-    return list(_rows(path)) if path.is_file() else []
+    return _rows(path)
 
 
 def newest(kind: Kind, task: str) -> list[Evidence]:
@@ -145,14 +153,12 @@ def latest(kind: Kind, task: str, **made_with: Any) -> dict[str, Evidence]:
 def write(row: Evidence) -> None:
     """Add a row to the ledger. It replaces the row of the same place, of any version."""
     path = folder_of(row.task) / row.kind / f"{row.task}.jsonl"
+    targets.try_folder(path.parent)
     path.parent.mkdir(parents=True, exist_ok=True)
     with _locked(path.parent):
-        known = _rows(path) if path.is_file() else ()
-        rows = {one.place: one for one in known} | {row.place: row}
+        rows = {one.place: one for one in _rows(path)} | {row.place: row}
         text = "".join(json.dumps(asdict(rows[place]), sort_keys=True) + "\n" for place in sorted(rows))
-        unfinished = path.with_suffix(".unfinished")
-        unfinished.write_text(text)
-        unfinished.replace(path)
+        targets.write(path, text)
 
 
 def not_measured(task: str) -> str:
@@ -160,16 +166,43 @@ def not_measured(task: str) -> str:
     return f"not measured on version {version_of(task)}"
 
 
-def _rows(path: Path) -> Iterator[Evidence]:
+def _rows(path: Path) -> list[Evidence]:
+    """The rows of a file; none if it does not exist."""
+    if not os.path.lexists(path):
+        return []
     try:
         lines = read_plain(path).decode().splitlines()
     except (ValueError, OSError) as error:
         raise BadConfig(f"{path} cannot be read: {cut(str(error))}; restore the file") from None
+    rows: dict[str, Evidence] = {}
     for number, line in enumerate(lines, 1):
         try:
-            yield Evidence(**json.loads(line))
-        except (ValueError, TypeError, RecursionError) as error:
+            row = _row(json.loads(line), path)
+            if row.place in rows:
+                raise ValueError(f"a row with this split ({row.split}) and these settings stands above")
+        except (ValueError, TypeError, RecursionError, BadConfig) as error:
             raise BadConfig(f"{path}, line {number}: {cut(str(error))}; restore the file") from None
+        rows[row.place] = row
+    return [*rows.values()]
+
+
+def _row(plain: Any, path: Path) -> Evidence:
+    """A row of a file.
+
+    Raises:
+        ValueError, TypeError: it is none, or about something else than the file.
+    """
+    if not isinstance(plain, dict):
+        raise ValueError("it is not a mapping")
+    row = Evidence(**plain)
+    for name, kind in _KINDS_OF_VALUES.items():
+        if type(getattr(row, name)) is not kind:
+            raise ValueError(f"{name} = {cut(repr(getattr(row, name)))}")
+    if (row.kind, row.task) != (path.parent.name, path.stem):
+        raise ValueError(f"it is of kind {cut(row.kind)}, about {cut(row.task)}")
+    if row.version < 1 or row.n < 0:
+        raise ValueError(f"version = {row.version}, n = {row.n}")
+    return row
 
 
 @contextmanager

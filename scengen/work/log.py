@@ -38,7 +38,7 @@ class Log:
             folder.mkdir(parents=True, exist_ok=True)
             self._lock.acquire(timeout=0)
         except Timeout:
-            raise BadConfig(f"another run is writing {folder}; wait for it or choose another to=") from None
+            raise BadConfig(f"another run is writing {folder}; wait for it, or name another folder") from None
         except OSError as error:
             raise refused(folder, error) from None
         try:
@@ -70,14 +70,15 @@ class Log:
         try:
             content = read_plain(self.path, MAX_JOURNAL) if os.path.lexists(self.path) else b""
         except ValueError as error:
-            raise BadConfig(f"{self.path} cannot be continued: {error}; choose another to=") from None
+            why = f"cannot be continued: {error}; move it aside, or name another folder"
+            raise BadConfig(f"{self.path} {why}") from None
         size = content.rfind(b"\n") + 1
         try:
             whole = [json.loads(line) for line in content[:size].splitlines()]
             if not all(isinstance(record, dict) for record in whole):
                 raise ValueError("a record is not a mapping")
         except (ValueError, RecursionError):
-            why = "is damaged; move it aside (do not delete it) to start over, or choose another to="
+            why = "is damaged; move it aside (do not delete it) to start over, or name another folder"
             raise BadConfig(f"{self.path} {why}") from None
         if whole and whole[0] != self.identity:
             names = ", ".join(different(whole[0], self.identity))

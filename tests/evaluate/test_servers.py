@@ -3,6 +3,7 @@
 import gc
 import socket
 import threading
+import time
 from contextlib import contextmanager
 
 import msgpack
@@ -13,6 +14,7 @@ from websockets.sync.server import serve
 from scengen.errors import BadConfig
 from scengen.evaluate.remote.client import ClientSettings, address_of
 from scengen.evaluate.remote.servers import BadServer, Gr00t, OpenPi, plain
+from scengen.evaluate.remote.wire import MAX_MESSAGE
 
 KEY = "sk-very-secret"
 
@@ -125,6 +127,23 @@ def test_a_description_that_changes_between_connections_is_named():
         server.close()
         with pytest.raises(BadServer, match=r"otherwise \(started\)"):
             server.describe()
+
+
+def test_the_time_to_connect_does_not_bound_an_answer():
+    def late(peer):
+        time.sleep(0.3)
+        peer.send(msgpack.packb({"fps": 100}))
+
+    with openpi(late) as (address, _):
+        server = OpenPi(address, client(connect=0.1, reconnects=0))
+        assert server.describe() == {"fps": 100}
+        server.close()
+
+
+def test_a_message_that_is_too_large_is_called_that():
+    told = pytest.raises(BadServer, match="message too big")
+    with openpi(lambda peer: peer.send(bytes(MAX_MESSAGE + 1))) as (address, _), told:
+        OpenPi(address, client(reconnects=0)).describe()
 
 
 def test_numbers_that_are_none_are_equal_to_themselves_in_a_description():

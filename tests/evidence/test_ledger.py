@@ -1,6 +1,7 @@
 """The ledger of measured figures: its rows are about today's tasks, and no page shows a figure of another version."""
 
 import json
+import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 
@@ -221,3 +222,39 @@ def test_rows_without_an_end_are_one_line(empty):
     path.write_text("[" * 100_000 + "\n")
     with pytest.raises(BadConfig, match="line 1: .*; restore the file"):
         ledger.read("plan", TASK.name)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"version": "2"},
+        {"version": [2]},
+        {"version": 0},
+        {"n": -1},
+        {"n": float("inf")},
+        {"n": True},
+        {"split": None},
+        {"value": "high"},
+        {"task": "packing"},
+        {"kind": "attack"},
+        {"proved": True},
+    ],
+)
+def test_a_row_that_no_measurement_writes_is_refused(changed, empty):
+    ledger.write(ROW)
+    path = empty / "plan" / "domino_single.jsonl"
+    path.write_text(path.read_text() + json.dumps({**asdict(ROW), "split": "diagonal", **changed}) + "\n")
+    with pytest.raises(BadConfig, match="line 2: .*; restore the file"):
+        ledger.read("plan", "domino_single")
+
+
+def test_two_rows_of_the_same_place_and_files_that_are_none_are_refused(empty):
+    ledger.write(ROW)
+    path = empty / "plan" / "domino_single.jsonl"
+    path.write_text(path.read_text() + json.dumps({**asdict(ROW), "n": 1000}) + "\n")
+    with pytest.raises(BadConfig, match="line 2: a row with this split .* stands above"):
+        ledger.read("plan", "domino_single")
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(BadConfig, match="it is not a plain file"):
+        ledger.read("plan", "domino_single")

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]  # as a program it has only its own folder there
 REFERENCE = ROOT / "generated" / "reference"
 WAYS = ("SIGKILL", "SIGTERM", "SIGINT", "worker", "disk")
 """Kill the group; tell the run to stop; press Ctrl-C; kill one worker; let no file grow beyond a size."""
@@ -216,10 +217,12 @@ def run(kind: Kind, kills: int, seed: int = 0, each: int = 3, more: Sequence[str
                     wrong.append(f"{way} after {after:.1f} s: {fault}")
                     print(wrong[-1], flush=True)
             try:
-                if finish(kind, pool) != whole:
-                    wrong.append(f"pool {pools}: other bytes")
+                fault = "" if finish(kind, pool) == whole else "other bytes"
             except RuntimeError as error:
-                wrong.append(f"pool {pools}: {error}")
+                fault = str(error)
+            if fault:
+                wrong.append(f"pool {pools}: {fault}")
+                print(wrong[-1], flush=True)
             print(f"{kind.words[0]}: {hits.total()} of {kills} kills, {len(wrong)} ended badly", flush=True)
     print(f"{pools} pools; {', '.join(f'{count} by {way}' for way, count in sorted(hits.items()))}")
     return wrong

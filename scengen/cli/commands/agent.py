@@ -7,9 +7,10 @@ from pathlib import Path
 
 from rich.table import Table
 
+from ...agents.acting import RETRIES
 from ...agents.page import TITLES, write_page
 from ...agents.prices import prices
-from ...agents.questioning import PLAN, UNDERSTAND
+from ...agents.questioning import ACT, PLAN, UNDERSTAND
 from ...agents.replies import kind_of
 from ...agents.runner import AgentSettings, Outcome, earlier, prompts, run
 from ...agents.tables import agreement, executed_lines, lines, lost_in_twins, markdown, plan_errors, sight_lines
@@ -77,6 +78,8 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
     formats = [(r["stage"], kind_of(r["format_error"])) for r in found.results if r["format_error"]]
     for (stage, kind), count in sorted(Counter(formats).items()):
         say(f"{TITLES[stage]}: {count} replies had no valid form ({kind})")
+    if misread := sum(result["grades"]["refused"] for result in found.results if result["stage"] == ACT):
+        say(f"{TITLES[ACT]}: {misread} calls had no valid form; after {RETRIES + 1} of them in a row the robot holds")
     for note, count in sorted(found.notes.items()):
         say(f"{note} ({count} calls)")
     versions = {result["task"]: result["task_version"] for result in found.results}

@@ -78,7 +78,7 @@ def _pools(app: ModuleType, settings: StudioSettings, search: tuple[str, ...]) -
     """
     pools = [Pool.open(folder).check() for folder in several(settings.pool or "")]
     if empty := [pool for pool in pools if not len(pool)]:
-        raise BadConfig(f"{empty[0].folder} holds no scenario; leave it out")
+        raise BadConfig(f"{empty[0].folder} holds no scenario; name another pool")
     tasks = {str(pool.folder): task_of(pool, search) for pool in pools}
     return app.Content(app.Shelf(pools, tasks))
 

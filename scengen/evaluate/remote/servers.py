@@ -153,6 +153,7 @@ class OpenPi(Server):
 
     def _dial(self) -> Mapping[str, Any]:
         plain = self._reach()
+        plain.settimeout(None)  # else the time to connect would bound every reply
         wait = struct.pack("ll", int(self.client.timeout), int(self.client.timeout % 1 * 1e6))
         plain.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, wait)
         try:
@@ -179,7 +180,7 @@ class OpenPi(Server):
         try:
             self._socket.send(request)
         except self._errors as error:
-            raise Lost(f"the connection is lost ({type(error).__name__})") from None
+            raise Lost(f"the connection is lost ({type(error).__name__}: {cut(str(error))})") from None
         return mapping(self._received(), "a reply")
 
     def _received(self) -> Any:
@@ -188,7 +189,7 @@ class OpenPi(Server):
         except TimeoutError:
             raise Lost(f"no reply within {self.client.timeout:g} s") from None
         except self._errors as error:
-            raise Lost(f"the connection is lost ({type(error).__name__})") from None
+            raise Lost(f"the connection is lost ({type(error).__name__}: {cut(str(error))})") from None
         if isinstance(message, str):  # openpi sends a traceback as text, and closes
             raise self.fault(f"the server reports an error: {_last_line(message)}")
         return unpacked(message)
