@@ -89,7 +89,7 @@ def clearest(world: World, aspect: float, states: Sequence[State] = (), directio
         states: states of the world. Default: the present one. The world ends in the last one.
         directions: those to choose from; the first one unless another one is better by `MIN_GAIN`.
     """
-    corners = [_hands(world), *(np.vstack([_thing_corners(world), _acting(world)]) for _ in _visit(world, states))]
+    corners = [_hands(world), *(np.vstack([_thing_corners(world), acting(world)]) for _ in _visit(world, states))]
     points = np.vstack(corners)
     points = points[points[:, 2] > min(TABLE_TOP - FALL_DEPTH, _lowest_fixed(world))]
     views = [fitted(world, aspect, *where, points) for where in directions]
@@ -159,7 +159,7 @@ def _hands(world: World) -> NDArray[np.float64]:
     return np.vstack([arm.hand for arm in world.arms])
 
 
-def _acting(world: World) -> NDArray[np.float64]:
+def acting(world: World) -> NDArray[np.float64]:
     """Positions of the hands that are near a thing, shape (n, 3) [m]."""
     boxes = [
         (world.data.geom_xpos[g], world.data.geom_xmat[g], *world.model.geom_aabb[g].reshape(2, 3))
