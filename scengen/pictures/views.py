@@ -160,7 +160,7 @@ def _hands(world: World) -> NDArray[np.float64]:
 
 
 def acting(world: World) -> NDArray[np.float64]:
-    """Positions of the hands that are near a thing, shape (n, 3) [m]."""
+    """Positions of the hands that are near a thing, those of partners included, shape (n, 3) [m]."""
     boxes = [
         (world.data.geom_xpos[g], world.data.geom_xmat[g], *world.model.geom_aabb[g].reshape(2, 3))
         for g in things(world)
@@ -170,7 +170,8 @@ def acting(world: World) -> NDArray[np.float64]:
         away = (np.abs((hand - at) @ frame.reshape(3, 3) - middle) - half for at, frame, middle, half in boxes)
         return min(float(np.linalg.norm(each.clip(0.0))) for each in away)
 
-    return np.array([hand for hand in _hands(world) if gap(hand) < NEAR]).reshape(-1, 3)
+    hands = [arm.hand for arm in (*world.arms, *world.partners)]
+    return np.array([hand for hand in hands if gap(hand) < NEAR]).reshape(-1, 3)
 
 
 def _thing_corners(world: World) -> NDArray[np.float64]:
