@@ -88,7 +88,7 @@ def clearest(world: World, aspect: float, states: Sequence[State] = (), directio
         states: states of the world. Default: the present one. The world ends in the last one.
         directions: those to choose from; the first one unless another one is better by `MIN_GAIN`.
     """
-    corners = [_hands(world), *(np.vstack([_thing_corners(world), _acting(world)]) for _ in _visit(world, states))]
+    corners = [_hands(world), *(np.vstack([_thing_corners(world), acting(world)]) for _ in _visit(world, states))]
     points = np.vstack(corners)
     points = points[points[:, 2] > min(TABLE_TOP - FALL_DEPTH, _lowest_fixed(world))]
     views = [fitted(world, aspect, *where, points) for where in directions]
@@ -158,8 +158,8 @@ def _hands(world: World) -> NDArray[np.float64]:
     return np.vstack([arm.hand for arm in world.arms])
 
 
-def _acting(world: World) -> NDArray[np.float64]:
-    """Positions of the hands that are near a thing, shape (n, 3) [m]."""
+def acting(world: World) -> NDArray[np.float64]:
+    """Positions of the hands that are near a thing, those of partners included, shape (n, 3) [m]."""
     boxes = [
         (world.data.geom_xpos[g], world.data.geom_xmat[g], *world.model.geom_aabb[g].reshape(2, 3))
         for g in things(world)
@@ -169,7 +169,8 @@ def _acting(world: World) -> NDArray[np.float64]:
         away = (np.abs((hand - at) @ frame.reshape(3, 3) - middle) - half for at, frame, middle, half in boxes)
         return min(float(np.linalg.norm(each.clip(0.0))) for each in away)
 
-    return np.array([hand for hand in _hands(world) if gap(hand) < NEAR]).reshape(-1, 3)
+    hands = [arm.hand for arm in (*world.arms, *world.partners)]
+    return np.array([hand for hand in hands if gap(hand) < NEAR]).reshape(-1, 3)
 
 
 def _thing_corners(world: World) -> NDArray[np.float64]:

@@ -163,6 +163,20 @@ def test_the_view_is_chosen_over_all_states(row, scenario):
     assert (world.state() == start).all() and chosen.elevation == at_start.elevation
 
 
+def test_a_hand_that_acts_is_in_the_picture(row):
+    world, states = World.load(row.scene_xml), []
+    for number, action in enumerate(row.witness):
+        world.step_filtered(action)
+        states += [world.state()] if number % 60 == 0 else []
+    view, acting = views.clearest(world, 4 / 3, states), 0
+    for state in states:
+        world.restore(state)
+        hands = views.acting(world)
+        acting += len(hands)
+        assert not len(hands) or np.abs(on_screen(world, view, hands, 4 / 3)).max() <= 1.0
+    assert acting > 2
+
+
 @drawing
 def test_an_unfinished_row_of_a_strip_is_white(row, scenario):
     take = film.Take(scenario, row.scene_xml, row.embodiment, row.witness[:5])
