@@ -211,6 +211,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._world: World | None = None
         self._renderer: Camera | None = None
         self._row: PoolRow = self._rows[0]
+        self._instruction: str | None = None
+        self.instruction_read = False
+        """Whether `task_description` was read."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles open the pools again and continue from the same state with a separate simulation."""
@@ -229,8 +232,18 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def task_description(self) -> str:
-        """The instruction of the running scenario."""
-        return self._row.instruction
+        """The instruction: that of the running scenario, or another one that `instruct` has given."""
+        self.instruction_read = True
+        return self.instruction
+
+    @property
+    def instruction(self) -> str:
+        """The same for evaluators: it does not count as read."""
+        return self._row.instruction if self._instruction is None else self._instruction
+
+    def instruct(self, text: str | None) -> None:
+        """Give another instruction than that of the running scenario; None for its own."""
+        self._instruction = text
 
     @property
     def horizon(self) -> float:
@@ -312,6 +325,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         with self._lock:
             reward, terminated, truncated, info = self._play(given if self.action_filter else unfiltered(given))
             return self._observe(), reward, terminated, truncated, info
+
+    @property
+    def renderer(self) -> str:
+        """Name of the renderer of the pictures; empty as long as there is none."""
+        return "" if self._renderer is None else self._renderer.device
 
     def render(self) -> Reading | None:  # type: ignore[override]
         """A picture of `camera`, shape (height, width, 3), or None without a render mode."""

@@ -1,16 +1,28 @@
 """Evaluations of one policy or several side by side: the table, the headline, and why episodes fail."""
 
+import json
+import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
+from ..perturb.perturbation import NONE
+from .arms import CLEAN
 from .edition import Edition
+from .lines import CSV, as_csv
 from .rollouts import Evaluation
 from .settings import EvaluateSettings
 from .table import TableLine, cells, otherwise, plain, table
 
+TABLE = "table.json"
+"""File with the figures of an evaluation."""
+MARKDOWN = "table.md"
+"""File with the same tables for people."""
+LOCAL = ("workers", "slots", "to", "fresh", "client")
+"""Settings on which no figure depends."""
 COUNTS = ("crashed", "otherwise")
 """Counts of the lines of a table, each shown if any is above 0."""
 MAX_SHOWN = 20
@@ -63,7 +75,12 @@ class PolicyResult:
     @cached_property
     def lines(self) -> list[TableLine]:
         """The lines of its table."""
-        return table(self.evaluation.episodes)
+        return table(self.clean)
+
+    @cached_property
+    def clean(self) -> list[dict[str, Any]]:
+        """Episodes without a perturbation and without an intervention."""
+        return [e for e in self.evaluation.episodes if (e["perturbation"], e["arm"]) == (NONE, CLEAN)]
 
     @property
     def task_versions(self) -> dict[str, int]:
@@ -117,9 +134,10 @@ class PolicyResult:
             "splits": settings.splits,
             "task_versions": self.task_versions,
             "edition": settings.edition and edition_told(settings.edition),
-            "settle": settings.settle,
-            "perturb": settings.perturb,
-            "perturb_seed": settings.perturb_seed,
+            "settings": {name: value for name, value in asdict(settings).items() if name not in LOCAL},
+            "episodes_sha256": self.evaluation.chain,
+            "lost": dict(self.evaluation.lost),
+            "arms": list(self.evaluation.arms),
             "headline": self.headline,
             "table": plain(self.lines),
             "failures": [asdict(failure) for failure in self.failures],
@@ -178,12 +196,20 @@ class Comparison:
         """The drop of each policy that has both sides, and how many of its successes were by the means."""
         return [line for result in self.results for line in (result.headline, result.by_means) if line]
 
-    @property
-    def plain(self) -> Mapping[str, Any]:
-        """The comparison as plain data; that of one policy alone is its result."""
-        if len(self.results) == 1:
-            return self.results[0].plain
-        return {"policies": [result.plain for result in self.results]}
+    def plain(self, folder: Path) -> Mapping[str, Any]:
+        """The comparison as plain data; that of one policy alone is its result.
+
+        Args:
+            folder: folder of the comparison.
+        """
+        told = [{"folder": os.path.relpath(r.settings.folder, folder), **r.plain} for r in self.results]
+        return told[0] if len(told) == 1 else {"policies": told}
+
+    def files(self, folder: Path) -> dict[Path, str]:
+        """Content of the files of the comparison: tables, and the lines of each policy without JSON."""
+        lines = {result.settings.folder / CSV: as_csv(result.evaluation.episodes) for result in self.results}
+        told = json.dumps(self.plain(folder), indent=1, allow_nan=False) + "\n"
+        return {**lines, folder / TABLE: told, folder / MARKDOWN: self.markdown}
 
     @property
     def markdown(self) -> str:
@@ -195,8 +221,6 @@ class Comparison:
             f"{names}: success in percent [95 % interval], {settings.seeds} scenarios a pool, "
             f"{settings.rollouts} rollouts each, {settings.rules} rules{settling}"
         )
-        if settings.perturb:
-            head += f", perturbed by {settings.perturb} (seed {settings.perturb_seed})"
         if settings.edition:
             edition = edition_told(settings.edition)
             head += f", edition {edition['name']} (sha256 {edition['sha256'][:12]})"

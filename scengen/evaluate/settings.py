@@ -12,10 +12,12 @@ from ..envs.vector import MAX_SLOTS
 from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName, cut
 from ..learn.store import is_policy, read_settings
+from ..perturb.perturbation import NONE as NO_PERTURBATION
 from ..perturb.perturbation import Perturbation
 from ..pool import collection
 from ..work.limits import at_least
 from ..work.parallel import Workers
+from .arms import AUTO, CLEAN, NONE, check_arms
 from .policies import FULL_RATE_POLICIES
 from .remote.client import ClientSettings, address_of, is_address, read_client
 
@@ -56,8 +58,9 @@ class EvaluateSettings:
     splits: str = ALL
     settle: bool = True
     keep: list[str] = field(default_factory=list)
-    perturb: str | None = None
+    perturb: str | list[str] | None = None
     perturb_seed: int = 0
+    arms: str | list[str] = AUTO
 
     @cached_property
     def folders(self) -> list[str]:
@@ -65,6 +68,20 @@ class EvaluateSettings:
         if self.pool is None:
             raise BadConfig("no pool was given; pass pool=FOLDER, or edition=NAME, whose pools scengen evaluate makes")
         return collection.folders(self.pool)
+
+    @cached_property
+    def perturbations(self) -> list[str]:
+        """Perturbations that are played in addition to the clean run, each once."""
+        given = self.perturb.split(",") if isinstance(self.perturb, str) else self.perturb or ()
+        return list(dict.fromkeys(str(p) for p in map(Perturbation.parse, given) if p))
+
+    @property
+    def chosen_arms(self) -> list[str] | None:
+        """Arms that are played in addition to the clean run; None if the inputs of the policy decide."""
+        if self.arms == AUTO:
+            return None
+        given = self.arms.split(",") if isinstance(self.arms, str) else self.arms
+        return [] if given in ([NONE], [""]) else list(dict.fromkeys(given))
 
     @property
     def name(self) -> str:
@@ -124,7 +141,8 @@ class EvaluateSettings:
         """Raise `ScengenError` if a setting is not valid."""
         check_filter(self.action_filter)
         check_rules(self.rules)
-        Perturbation.parse(self.perturb)
+        check_arms(self.chosen_arms or ())
+        self.perturbations  # noqa: B018  (it raises an error)
         if self.splits not in SPLITS:
             raise UnknownName("splits", self.splits, SPLITS)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1, perturb_seed=0)
@@ -145,13 +163,36 @@ class EvaluateSettings:
 
 
 @dataclass(frozen=True, order=True)
+class Condition:
+    """What is changed in an episode without another scenario."""
+
+    perturbation: str = NO_PERTURBATION
+    """Kinds of perturbation at their levels."""
+    arm: str = CLEAN
+    """Name of the arm."""
+
+    def __str__(self) -> str:
+        return "/".join(each for each in (self.perturbation, self.arm) if each not in (NO_PERTURBATION, CLEAN))
+
+    def __bool__(self) -> bool:
+        return self != Condition()
+
+
+@dataclass(frozen=True, order=True)
 class RolloutId:
-    """The identity of a rollout: number `rollout` of a scenario."""
+    """The identity of a rollout: number `rollout` of a scenario under a condition."""
 
     task: str
+    perturbation: str
+    arm: str
     pool: str
     scenario: str
     rollout: int
+
+    @property
+    def condition(self) -> Condition:
+        """What is changed."""
+        return Condition(self.perturbation, self.arm)
 
 
 def completed(settings: EvaluateSettings) -> EvaluateSettings:

@@ -10,7 +10,7 @@ import pytest
 
 from scengen import cli
 from scengen.errors import BadConfig
-from scengen.evaluate import rollouts
+from scengen.evaluate import scenarios
 from scengen.evaluate.comparison import PolicyResult
 from scengen.evaluate.rollouts import Evaluation, evaluate
 from scengen.evaluate.settings import EvaluateSettings
@@ -364,10 +364,10 @@ def test_a_crash_of_a_policy_is_counted_beside_the_rate(mine, tmp_path, capsys):
 def test_the_papers_splits_are_training_and_the_papers_conditions(monkeypatch, tmp_path):
     paper = {"domino_single": "diagonal"}
     for split, wanted in (("id", True), ("diagonal", True), ("wide_gaps", False)):
-        assert rollouts._is_wanted("domino_single", split, "paper", ()) is wanted
-        assert rollouts._is_wanted("domino_single", split, "all", ())
-    assert rollouts._paper_axes("domino_single", ()) == (paper["domino_single"],)
-    monkeypatch.setattr(rollouts, "_is_wanted", lambda *_: False)
+        assert scenarios._is_wanted("domino_single", split, "paper", ()) is wanted
+        assert scenarios._is_wanted("domino_single", split, "all", ())
+    assert scenarios._paper_axes("domino_single", ()) == (paper["domino_single"],)
+    monkeypatch.setattr(scenarios, "_is_wanted", lambda *_: False)
     with pytest.raises(BadConfig, match="these pools have none of them, but id; pass splits=all"):
         run(tmp_path, "idle", splits="paper")
 

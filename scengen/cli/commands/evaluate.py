@@ -15,7 +15,7 @@ from ...evaluate.settings import EvaluateSettings, other_version
 from ...pool import Pool
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
-from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write, write_json
+from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write
 from .settings import read
 
 
@@ -38,13 +38,14 @@ def command(arguments: Arguments) -> int:
             results.append(PolicyResult(one, _evaluated(one, progress_bar.of, search)))
     compared = Comparison(results)
     _show(compared, settings)
-    write(settings.folder / "table.md", compared.markdown)
-    write_json(str(settings.folder / "table.json"), compared.plain)
+    for path, text in compared.files(settings.folder).items():
+        write(path, text)
     incomplete = [_report(result) for result in results]
     if len(results) > 1:
         for result in results:
-            say(f"wrote {result.settings.folder}: episodes.jsonl")
-    say(f"wrote {settings.folder}: table.md, table.json{'' if len(results) > 1 else ', episodes.jsonl'}")
+            say(f"wrote {result.settings.folder}: episodes.jsonl, episodes.csv")
+    lines = "" if len(results) > 1 else ", episodes.jsonl, episodes.csv"
+    say(f"wrote {settings.folder}: table.md, table.json{lines}")
     return FAILED if any(incomplete) else OK
 
 

@@ -1,0 +1,297 @@
+"""Verification of the results of an evaluation: lines, scenarios, starts, outcomes with kept actions, figures."""
+
+import json
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..compose import load_task
+from ..episode import Actions
+from ..errors import BadConfig, ScengenError, cut
+from ..pool import Pool, kinds
+from ..pool.demonstrations import Demonstrations, is_demonstrations
+from ..pool.manifest import MANIFEST
+from ..pool.untrusted import read_json
+from ..validate.verify.examine import Verdict
+from ..validate.verify.spot import excluded_share
+from ..work.log import different
+from ..work.parallel import UNTRUSTED_LIMITS, Workers, each
+from ..work.plain import MAX_JOURNAL, read_plain
+from ..work.typed import typed
+from .claims import Fault, broken, incomplete, malformed, untrue
+from .comparison import TABLE, Comparison, PolicyResult
+from .lines import CHAIN, FORMAT, RUN, kept_folder, read_lines
+from .rebuilding import Rebuilder, Rebuilt, lost
+from .rollouts import Evaluation, armed, id_of, order, perturbed, wanted
+from .scenarios import Scenarios, chosen, known, not_playable
+from .settings import EvaluateSettings, RolloutId
+
+SAMPLE = 20
+"""Number of lines that are rebuilt by default."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Extent of a verification."""
+
+    sample: int | None = SAMPLE
+    """Number of lines to rebuild; None for all."""
+    seed: int = 0
+    """Seed of the sample."""
+    pools: Sequence[str] = ()
+    """Folders of pools that are not where the run found them."""
+    workers: Workers = 1
+    """Workers that rebuild lines."""
+    search: Sequence[str] = ()
+    """Overrides that add folders of other packages."""
+
+
+@dataclass
+class ResultsReport:
+    """Result of the verification of the episodes of one policy."""
+
+    folder: str
+    """Folder of the episodes."""
+    lines: int = 0
+    """Number of lines."""
+    rebuilt: int = 0
+    """Number of lines that were rebuilt."""
+    pictures: int = 0
+    """Number of rebuilt lines whose pictures were compared."""
+    replayed: int = 0
+    """Number of lines whose kept actions were played to the end."""
+    faults: list[str] = field(default_factory=list)
+    """What is wrong."""
+    declined: list[str] = field(default_factory=list)
+    """What could not be decided."""
+    claimed: list[str] = field(default_factory=list)
+    """What is the author's word."""
+    remarks: list[str] = field(default_factory=list)
+    """What a reader should know."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether everything that was checked is right."""
+        return "refuted" if self.faults else "declined" if self.declined else "sound"
+
+
+def audit(folder: Path, options: Options, progress: Callable[[int, int], None]) -> list[ResultsReport]:
+    """Verify a folder of results: the episodes of each policy, then the tables.
+
+    Args:
+        progress: called with the number of rebuilt lines, and their total.
+
+    Raises:
+        BadConfig: the folder holds no results of this format, or a pool is not here.
+    """
+    stored = _mapping(folder / TABLE)
+    audits = [_Audit(folder, told, options) for told in stored.get("policies", [stored])]
+    for one in audits:
+        one.run(progress)
+    if all(one.readable for one in audits):
+        try:
+            audits[0].report.faults += _other_tables(folder, stored, [one.result for one in audits])
+        except ScengenError as error:
+            audits[0].report.declined.append(f"the tables were not compared: {error}")
+    return [one.report for one in audits]
+
+
+def _other_tables(folder: Path, stored: Mapping[str, Any], results: Sequence[PolicyResult]) -> Iterator[str]:
+    """Differences between the files of results and those that the lines give."""
+    for path, text in Comparison(results).files(folder).items():
+        if path.name == TABLE:
+            names = different(dict(stored), json.loads(text))
+            if names:
+                yield f"{path.name} has other figures than its lines give: {', '.join(names[:5])}"
+        elif not path.is_file() or path.read_text() != text:
+            yield f"{path} is not the one that its lines give"
+
+
+def _mapping(path: Path) -> dict[str, Any]:
+    """Content of a file of results.
+
+    Raises:
+        BadConfig: it cannot be read, or holds something else.
+    """
+    try:
+        found = read_json(read_plain(path, MAX_JOURNAL).decode(), MAX_JOURNAL)
+    except (ValueError, OSError) as error:
+        why = " ".join(str(error).split())[:160]
+        raise BadConfig(f"{path} cannot be read: {why}; give a folder that scengen evaluate wrote") from None
+    if not isinstance(found, dict):
+        raise BadConfig(f"{path} is not a mapping; give a folder that scengen evaluate wrote")
+    return found
+
+
+def _pool_here(name: str, sha256: str, given: Sequence[Pool]) -> Pool:
+    """The pool of a run.
+
+    Raises:
+        BadConfig: it is neither among the given ones nor in the folder that the run names.
+    """
+    for pool in given:
+        if pool.sha256 == sha256:
+            return pool
+    if Path(name, MANIFEST).is_file() and (pool := Pool.open(name).check()).sha256 == sha256:
+        return pool
+    raise BadConfig(f"the pool {name} of these results (sha256 {sha256[:12]}) is not here; pass pool=FOLDER")
+
+
+class _Audit:
+    """Verification of the episodes of one policy."""
+
+    def __init__(self, folder: Path, stored: Any, options: Options):
+        if not isinstance(stored, Mapping) or "settings" not in stored:
+            raise BadConfig(f"{folder / TABLE} is of an earlier release, whose lines cannot be rebuilt; evaluate again")
+        self.stored, self.options = stored, options
+        self.folder = folder / str(stored["folder"])
+        self.told = typed("settings", EvaluateSettings, {**stored["settings"], "to": str(self.folder)})
+        self.of_run = _mapping(self.folder / RUN)
+        if (given := self.of_run.get("format")) != FORMAT:
+            raise BadConfig(f"{self.folder / RUN} has format {cut(repr(given), 20)}; this version reads {FORMAT}")
+        self.lines, self.readable = read_lines(self.folder / kinds.EPISODES), False
+        self.report, self.sampled = ResultsReport(str(self.folder), len(self.lines)), 0
+        self._actions: dict[Path, dict[tuple[str, int], Actions]] = {}
+        given = [Pool.open(folder).check() for folder in options.pools]
+        self.pools = {name: _pool_here(name, sha256, given) for name, sha256 in self.of_run["pools"].items()}
+
+    @cached_property
+    def settings(self) -> EvaluateSettings:
+        """Settings of the run, with the folders in which the pools are here."""
+        names = [name for name in self.of_run if name in vars(self.told) and name != "policy"]
+        folders = [str(pool.folder) for pool in self.pools.values()]
+        return replace(self.told, pool=folders, **{name: self.of_run[name] for name in names})
+
+    @property
+    def result(self) -> PolicyResult:
+        """The result that the lines give."""
+        lines = sorted((line for line in self.lines if id_of(line) in self.wanted), key=order)
+        arms = self.stored.get("arms", [])
+        return PolicyResult(self.told, Evaluation(lines, 0, self.lost, arms, self.lines[-1][CHAIN] if lines else ""))
+
+    def run(self, progress: Callable[[int, int], None]) -> None:
+        """Check form, order, completeness and claims of all lines, and rebuild a sample."""
+        if self._tell(malformed(self.lines)):
+            return
+        self.readable = True
+        self._tell(broken(self.of_run, self.lines, self.stored.get("episodes_sha256")))
+        self._tell(incomplete(self.lines, self.wanted))
+        self._tell((None, text) for text in self._other_run())
+        for number, line in enumerate(self.lines):
+            self._tell((number, text) for text in untrue(line, self._every, self.of_run, self.told.name))
+        self._rebuild(progress)
+        self._remarks()
+
+    def _tell(self, faults: Iterable[Fault]) -> bool:
+        """Add faults to the report. Returns whether there are any."""
+        told = [text if number is None else f"line {number} {text}" for number, text in faults]
+        self.report.faults += told
+        return bool(told)
+
+    # --- what was to be played ----------------------------------------------------------------
+
+    @cached_property
+    def wanted(self) -> set[RolloutId]:
+        """The rollouts of the table."""
+        about = {key: told for key, told in self._chosen.items() if key[1] not in self.lost}
+        return wanted(about, self.told, [*perturbed(self.told), *armed(self.stored.get("arms", []))])
+
+    @cached_property
+    def lost(self) -> dict[str, str]:
+        """Scenarios that the results leave out, with the reasons."""
+        return dict(self.stored.get("lost", {}))
+
+    @cached_property
+    def _chosen(self) -> Scenarios:
+        return self._as_named(chosen([*self.pools.values()], self.settings, self.options.search))
+
+    @cached_property
+    def _every(self) -> Scenarios:
+        every = (known(pool, self.options.search) for pool in self.pools.values())
+        return self._as_named({key: told for some in every for key, told in some.items()})
+
+    def _as_named(self, some: Scenarios) -> Scenarios:
+        """Scenarios under the folders that the lines name."""
+        named = {str(pool.folder): name for name, pool in self.pools.items()}
+        return {(named[folder], id_): told for (folder, id_), told in some.items()}
+
+    def _other_run(self) -> Iterator[str]:
+        """Settings of the table that are not those of the run, and scenarios that are left out without a reason."""
+        for name in ("policy", "version", "rules", "perturb_seed"):
+            if self.of_run.get(name) != getattr(self.told, name):
+                yield f"{TABLE} says {name} = {getattr(self.told, name)!r:.60}, {RUN} has {self.of_run.get(name)!r:.60}"
+        for task, version in self.of_run["task_versions"].items():
+            if text := load_task(task, self.options.search).other_version("played on", version):
+                self.report.declined.append(text)
+        here = {str(pool.folder): pool for pool in self.pools.values()}
+        left_out = {key: a for key, a in chosen([*here.values()], self.settings, ()).items() if key[1] in self.lost}
+        fails = not_playable([*here.values()], left_out, self.options.workers) if left_out else {}
+        for id_ in sorted(self.lost):
+            if id_ not in fails:
+                yield f"{id_} was left out as unplayable, but it can be played"
+
+    # --- rebuilding ---------------------------------------------------------------------------
+
+    def _rebuild(self, progress: Callable[[int, int], None]) -> None:
+        """Rebuild a sample of the lines that name a scenario of the pools and a state."""
+        count, rng = len(self.lines), random.Random(self.options.seed)
+        some = (
+            range(count) if self.options.sample is None else rng.sample(range(count), min(self.options.sample, count))
+        )
+        numbers = [number for number in some if self._can_be_rebuilt(self.lines[number])]
+        numbers.sort(key=lambda number: id_of(self.lines[number]))
+        items = [(number, self.lines[number], self._kept(number)) for number in numbers]
+        rebuilder = Rebuilder(self.settings, self.of_run["observed"], self.options.search)
+        for done, one in enumerate(each(rebuilder, items, self.options.workers, UNTRUSTED_LIMITS, lost), 1):
+            self._count(one)
+            progress(done, len(items))
+        self.sampled = len(some)
+
+    def _can_be_rebuilt(self, line: Mapping[str, Any]) -> bool:
+        return not line["crashed"] and (line["pool"], line["scenario"]) in self._every
+
+    def _count(self, one: Rebuilt) -> None:
+        self._tell((one.number, fault) for fault in one.faults)
+        if one.lost:
+            self.report.declined.append(f"line {one.number}: rebuilding it {one.lost}")
+        self.report.rebuilt += not one.lost
+        self.report.pictures += one.pictures
+        self.report.replayed += one.replayed
+
+    def _kept(self, number: int) -> Actions | None:
+        """The actions of a line that were kept."""
+        which = id_of(self.lines[number])
+        folder = kept_folder(self.folder, which)
+        if folder not in self._actions:
+            found = Demonstrations.open(folder) if is_demonstrations(folder) else None
+            rows = [] if found is None else [*found.rows(), *found.failures()]
+            self._actions[folder] = {(row.id, row.run): row.witness for row in rows}
+        actions = self._actions[folder].get((which.scenario, which.rollout))
+        if actions is None and self.of_run.get("keep"):
+            self._tell([(number, f"has no kept actions in {folder}")])
+        return actions
+
+    # --- what is not known --------------------------------------------------------------------
+
+    def _remarks(self) -> None:
+        """State what was not checked."""
+        report, count = self.report, len(self.lines)
+        if self.sampled < count:
+            share = 100 * excluded_share(count, self.sampled)
+            bound = f"a share of {share:.3g} % or more of lines that cannot be rebuilt is excluded at 95 %"
+            report.remarks.append(f"{self.sampled} of {count} lines rebuilt, seed {self.options.seed}: {bound}")
+        if count > len(self.wanted):
+            report.remarks.append(f"{count - len(self.wanted)} lines are of a longer run, and not in the table")
+        seen = sum(bool(line["pictures"]) for line in self.lines)
+        if seen and report.pictures < min(report.rebuilt, seen):
+            report.remarks.append(f"first pictures of {report.pictures} lines compared: others are of another renderer")
+        if count > report.replayed:
+            report.claimed.append(
+                f"the outcomes of {count - report.replayed} lines, whose actions were not played again"
+            )
+        if crashed := sum(bool(line["crashed"]) for line in self.lines):
+            report.claimed.append(f"that the policy crashed in {crashed} episodes")
+        report.claimed.append("that this policy chose the actions")

@@ -1,0 +1,82 @@
+"""Scenarios of an evaluation: the first ones of each pool that can be played."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+from ..compose import load_task
+from ..errors import BadConfig
+from ..pool import Pool
+from ..samplers.split import ID
+from ..samplers.task_files import about as about_task
+from ..validate.playable import unplayable
+from ..work.parallel import Workers
+from .settings import PAPER, EvaluateSettings
+
+Scenarios = Mapping[tuple[str, str], Mapping[str, Any]]
+"""What lines say of scenarios, by the pool's folder and the scenario's id."""
+
+
+def chosen(pools: Sequence[Pool], settings: EvaluateSettings, search: Sequence[str]) -> Scenarios:
+    """The first scenarios of each pool, of the chosen splits.
+
+    Raises:
+        BadConfig: a pool holds fewer, or none of them has one of the splits.
+    """
+    found = {key: told for pool in pools for key, told in _first(pool, settings, search).items()}
+    if not found:
+        named = ", ".join(sorted({split for pool in pools for split in pool.kinds("split")[0]}))
+        raise BadConfig(f"splits = {settings.splits}; these pools have none of them, but {named}; pass splits=all")
+    return found
+
+
+def known(pool: Pool, search: Sequence[str]) -> Scenarios:
+    """All scenarios of a pool."""
+    names = ("task", "category", "split", "seed", "index", "id_twin", "shifted", "scene_sha256")
+    rows = [(id_, dict(zip(names, told, strict=True))) for id_, *told in pool.columns("id", *names)]
+    versions = {name: load_task(name, search).version for name in {told["task"] for _, told in rows}}
+    return {(str(pool.folder), id_): {**told, "task_version": versions[told["task"]]} for id_, told in rows}
+
+
+def not_playable(pools: Sequence[Pool], some: Scenarios, workers: Workers) -> dict[str, str]:
+    """Those of some scenarios that cannot be played within the limits, with the reasons."""
+    rows = (
+        row
+        for pool in pools
+        for row in itertools.islice(pool.rows(), _last(pool, some))
+        if (str(pool.folder), row.id) in some
+    )
+    return dict(unplayable(rows, workers))
+
+
+def _first(pool: Pool, settings: EvaluateSettings, search: Sequence[str]) -> Scenarios:
+    """The first scenarios of a pool, of the chosen splits.
+
+    Raises:
+        BadConfig: the pool holds fewer.
+    """
+    if not len(pool):
+        raise BadConfig(f"{pool.folder} holds no scenario; choose another pool")
+    every = known(pool, search)
+    wanted = {key: a for key, a in every.items() if _is_wanted(a["task"], a["split"], settings.splits, search)}
+    if wanted and len(wanted) < settings.seeds:
+        remedy = f"pass seeds={len(wanted)}"
+        raise BadConfig(f"seeds = {settings.seeds}, but {pool.folder} holds {len(wanted)} scenarios; {remedy}")
+    return dict(itertools.islice(wanted.items(), settings.seeds))
+
+
+def _is_wanted(task: str, split: str, splits: str, search: Sequence[str]) -> bool:
+    """Whether a split belongs to a set of splits."""
+    return splits != PAPER or split == ID or split in _paper_axes(task, tuple(search))
+
+
+@cache
+def _paper_axes(task: str, search: tuple[str, ...]) -> tuple[str, ...]:
+    return about_task(task, search).paper_axes
+
+
+def _last(pool: Pool, about: Scenarios) -> int:
+    """Number of rows of a pool up to the last chosen one."""
+    numbers = [n for n, (id_,) in enumerate(pool.columns("id"), 1) if (str(pool.folder), id_) in about]
+    return max(numbers, default=0)
