@@ -2,6 +2,7 @@
 
 import json
 import random
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,7 +26,7 @@ from .claims import Fault, broken, incomplete, malformed, untrue
 from .comparison import TABLE, Comparison, PolicyResult
 from .lines import CHAIN, FORMAT, RUN, kept_folder, read_lines
 from .rebuilding import Rebuilder, Rebuilt, lost
-from .rollouts import Evaluation, armed, id_of, order, perturbed, wanted
+from .rollouts import Evaluation, armed, here, id_of, order, perturbed, wanted
 from .scenarios import Scenarios, chosen, known, not_playable
 from .settings import EvaluateSettings, RolloutId
 
@@ -182,6 +183,7 @@ class _Audit:
         self._tell((None, text) for text in self._other_run())
         for number, line in enumerate(self.lines):
             self._tell((number, text) for text in untrue(line, self._every, self.of_run, self.told.name))
+        self._tell(self._crashed_with_actions())
         self._rebuild(progress)
         self._remarks()
 
@@ -264,15 +266,26 @@ class _Audit:
     def _kept(self, number: int) -> Actions | None:
         """The actions of a line that were kept."""
         which = id_of(self.lines[number])
+        actions = self._kept_of(which).get((which.scenario, which.rollout))
+        if actions is None and self.of_run.get("keep"):
+            self._tell([(number, f"has no kept actions in {kept_folder(self.folder, which)}")])
+        return actions
+
+    def _kept_of(self, which: RolloutId) -> Mapping[tuple[str, int], Actions]:
+        """The kept actions of the folder of a rollout, by scenario and number."""
         folder = kept_folder(self.folder, which)
         if folder not in self._actions:
             found = Demonstrations.open(folder) if is_demonstrations(folder) else None
             rows = [] if found is None else [*found.rows(), *found.failures()]
             self._actions[folder] = {(row.id, row.run): row.witness for row in rows}
-        actions = self._actions[folder].get((which.scenario, which.rollout))
-        if actions is None and self.of_run.get("keep"):
-            self._tell([(number, f"has no kept actions in {folder}")])
-        return actions
+        return self._actions[folder]
+
+    def _crashed_with_actions(self) -> Iterator[Fault]:
+        """Lines of crashes whose episode was played to its end: its actions were kept."""
+        for number, line in enumerate(self.lines):
+            which = id_of(line)
+            if line["crashed"] and (which.scenario, which.rollout) in self._kept_of(which):
+                yield number, "says that the policy crashed, but the actions of a whole episode were kept"
 
     # --- what is not known --------------------------------------------------------------------
 
@@ -285,13 +298,19 @@ class _Audit:
             report.remarks.append(f"{self.sampled} of {count} lines rebuilt, seed {self.options.seed}: {bound}")
         if count > len(self.wanted):
             report.remarks.append(f"{count - len(self.wanted)} lines are of a longer run, and not in the table")
+        report.remarks += self._other_machines()
         seen = sum(bool(line["pictures"]) for line in self.lines)
         if seen and report.pictures < min(report.rebuilt, seen):
             report.remarks.append(f"first pictures of {report.pictures} lines compared: others are of another renderer")
         if count > report.replayed:
-            report.claimed.append(
-                f"the outcomes of {count - report.replayed} lines, whose actions were not played again"
-            )
+            report.claimed.append(f"outcomes of {count - report.replayed} lines: their actions were not played again")
         if crashed := sum(bool(line["crashed"]) for line in self.lines):
             report.claimed.append(f"that the policy crashed in {crashed} episodes")
-        report.claimed.append("that this policy chose the actions")
+        report.claimed.append("that this policy chose the actions, and whether it read the instruction")
+
+    def _other_machines(self) -> Iterator[str]:
+        """Versions and rounding under which lines were played, where they are not those here."""
+        for name, there in here().items():
+            for other, count in Counter(line[name] for line in self.lines if line[name] != there).items():
+                what = "; their states and outcomes alone are compared" if name == "machine" else ""
+                yield f"{count} lines were played with {name} {cut(other, 40)}, this is {there}{what}"

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 from ..errors import BadConfig, ScengenError, cut
@@ -10,7 +11,7 @@ from ..pool.files import sha256
 from .arms import CLEAN, check_arms
 from .lines import CHAIN, EpisodeLine, Lines, chained, run_sha256
 from .player import policy_seed
-from .rollouts import id_of, told_of
+from .rollouts import id_of, order, told_of
 from .scenarios import Scenarios
 from .settings import RolloutId
 
@@ -43,6 +44,9 @@ def broken(identity: Mapping[str, Any], lines: Lines, end: Any) -> Iterator[Faul
         if line[CHAIN] != chained(before, line):
             yield number, "does not follow from the line before: one of them was edited, moved, repeated or left out"
         before = line[CHAIN]
+    for number, (one, other) in enumerate(pairwise(map(order, lines)), 1):
+        if other < one:
+            yield number, "is not in the order of the file: lines were moved"
     if before != end:
         yield None, "the last line is not the one that the table was made from"
 

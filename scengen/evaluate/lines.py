@@ -129,6 +129,8 @@ class EpisodeLine:
         return typed("", cls, plain, exact=True)
 
 
+Lines = Sequence[Mapping[str, Any]]
+"""Lines as plain data."""
 COLUMNS = tuple(field.name for field in fields(EpisodeLine))
 """Names of the fields of a line."""
 _JSON_TYPES = {int: "integer", float: "number", str: "string", bool: "boolean", Mapping: "object"}
@@ -163,6 +165,20 @@ def chained(before: str, plain: Mapping[str, Any]) -> str:
     """
     own = {name: value for name, value in plain.items() if name != CHAIN}
     return sha256(f"{before}\n{json.dumps(own, sort_keys=True)}")
+
+
+def renewed(identity: Mapping[str, Any], lines: Lines) -> list[dict[str, Any]]:
+    """Lines in a new order, with new numbers and hashes.
+
+    Args:
+        identity: settings of the run.
+    """
+    found, before = list[dict[str, Any]](), run_sha256(identity)
+    for number, line in enumerate(lines):
+        moved = {**line, "episode": number}
+        before = moved[CHAIN] = chained(before, moved)
+        found.append(moved)
+    return found
 
 
 def run_sha256(identity: Mapping[str, Any]) -> str:
@@ -215,7 +231,3 @@ def as_csv(lines: Iterable[Mapping[str, Any]]) -> str:
 
 def _cell(value: Any) -> Any:
     return json.dumps(value, sort_keys=True) if isinstance(value, (Mapping, bool)) else value
-
-
-Lines = Sequence[Mapping[str, Any]]
-"""Lines as plain data."""

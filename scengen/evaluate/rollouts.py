@@ -24,7 +24,7 @@ from ..work.machine import cores
 from ..work.parallel import each
 from ..work.targets import refused, try_folder
 from .arms import ARMS, LANGUAGE, PICTURES
-from .lines import CHAIN, COLUMNS, FORMAT, RUN, chained, run_sha256
+from .lines import CHAIN, COLUMNS, FORMAT, RUN, chained, renewed, run_sha256
 from .player import PolicyPlayer, policy_seed
 from .scenarios import Scenarios, chosen, not_playable
 from .settings import Condition, EvaluateSettings, RolloutId, completed
@@ -92,7 +92,8 @@ def evaluate(
             run = _Run(settings, player, about, log, keep, progress)
             run.play(wanted(about, settings, perturbed(settings)))
             run.play(wanted(about, settings, armed(arms := run.arms())))
-            return Evaluation(sorted(run.lines(), key=order), run.earlier, lost, arms, run.chain)
+            run.sort()
+            return Evaluation(run.lines(), run.earlier, lost, arms, run.chain)
 
 
 @dataclass
@@ -134,6 +135,12 @@ class _Run:
         """Hash at the end of the log."""
         return self.log.records[-1][CHAIN] if self.log.records else run_sha256(self.log.identity)
 
+    def sort(self) -> None:
+        """Bring the lines into an order that does not depend on when they were played."""
+        there = sorted(self.log.records, key=order)
+        if there != self.log.records:
+            self.log.replace(renewed(self.log.identity, there))
+
     def arms(self) -> list[str]:
         """The chosen arms; by default those of the inputs that the policy has."""
         if self.settings.chosen_arms is not None:
@@ -147,13 +154,13 @@ class _Run:
         """Store the line of an episode."""
         told = told_of(id_of(record), self.about[record["pool"], record["scenario"]])
         made = {"policy": self.settings.name, "instruction_sha256": sha256(record["instruction"])}
-        line = {"episode": len(self.log.records), **record, **told, **made, **_here()}
+        line = {"episode": len(self.log.records), **record, **told, **made, **here()}
         line = {name: line[name] for name in COLUMNS if name != CHAIN}
         self.log.add({**line, CHAIN: chained(self.chain, line)})
 
 
 @cache
-def _here() -> dict[str, Any]:
+def here() -> dict[str, Any]:
     """Versions and fingerprint of this machine."""
     found = versions()
     return {"machine": fingerprint(), "scengen": found["scengen"], "mujoco": found["mujoco"]}
@@ -184,9 +191,10 @@ def armed(arms: Sequence[str]) -> list[Condition]:
 
 
 def order(line: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Key by which lines are sorted: training first, and clean episodes before others."""
-    condition, which = Condition(line["perturbation"], line["arm"]), (line["split"], line["scenario"], line["rollout"])
-    return line["task"], bool(condition), condition, line["split"] != ID, *which
+    """Key by which lines are sorted: clean episodes first, and those in training before others."""
+    condition = Condition(line["perturbation"], line["arm"])
+    where = line["split"] != ID, line["split"], line["pool"], line["index"], line["scenario"], line["rollout"]
+    return line["task"], bool(condition), condition, *where
 
 
 def _played(player: PolicyPlayer, todo: Sequence[RolloutId]) -> Iterator[dict[str, Any]]:

@@ -11,7 +11,7 @@ from filelock import FileLock, Timeout
 
 from ..errors import BadConfig
 from .plain import MAX_JOURNAL, read_plain
-from .targets import refused
+from .targets import refused, write
 
 
 class Log:
@@ -71,6 +71,14 @@ class Log:
         except OSError as error:
             raise refused(self.path, error) from None
         self.records.append(record)
+
+    def replace(self, records: list[dict[str, Any]]) -> None:
+        """Replace all records of a log with a separate head, at once or not at all."""
+        assert self.head is not None
+        write(self.path, b"".join(json.dumps(record).encode() + b"\n" for record in records))
+        self._file.close()
+        self._file = open(self.path, "ab", buffering=0)  # noqa: SIM115  (closed by `close`)
+        self.records = records
 
     def _open(self) -> None:
         """Read the file and prepare it for more records. A line that a kill has cut short is dropped."""
