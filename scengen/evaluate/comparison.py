@@ -10,12 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from ..perturb.perturbation import NONE
+from ..samplers.split import ID
 from .arms import CLEAN
+from .conditions import ConditionLine, Interaction, arm_sentences, condition_lines, interactions
 from .edition import Edition
 from .lines import CSV, as_csv
 from .rollouts import Evaluation
+from .rows import Row, rows, shown
 from .settings import EvaluateSettings
-from .table import TableLine, cells, otherwise, plain, table
+from .statistics import smallest_visible_drop
+from .table import TableLine, distinct, otherwise, plain, table
 
 TABLE = "table.json"
 """File with the figures of an evaluation."""
@@ -23,8 +27,6 @@ MARKDOWN = "table.md"
 """File with the same tables for people."""
 LOCAL = ("workers", "slots", "to", "fresh", "client")
 """Settings on which no figure depends."""
-COUNTS = ("crashed", "otherwise")
-"""Counts of the lines of a table, each shown if any is above 0."""
 MAX_SHOWN = 20
 """Largest number of reasons in a printed list."""
 
@@ -74,8 +76,43 @@ class PolicyResult:
 
     @cached_property
     def lines(self) -> list[TableLine]:
-        """The lines of its table."""
-        return table(self.clean)
+        """The lines of its table, without means that repeat another line."""
+        return distinct(table(self.clean), {e["task"]: e["category"] for e in self.clean})
+
+    @cached_property
+    def conditions(self) -> list[ConditionLine]:
+        """Its success under each condition."""
+        return condition_lines(self.evaluation.episodes)
+
+    @cached_property
+    def interactions(self) -> list[Interaction]:
+        """Interactions of axes and perturbations."""
+        return interactions(self.evaluation.episodes)
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """The rows of its table."""
+        return [*rows(self.settings.name, self.lines, self.conditions, self.clean)]
+
+    @property
+    def sentences(self) -> Iterator[str]:
+        """What its table says in words: the drop, what is used, interactions, the means, what so few could not show."""
+        yield self.headline
+        before = {(row.task, row.split): row.rate for row in self.rows if not row.condition}
+        for told in (*arm_sentences(self.conditions, before), *self.interactions, self.by_means, self._visible):
+            yield f"{self.settings.name}: {told}" if told else ""
+
+    @property
+    def _visible(self) -> str:
+        """The smallest drop that this number of scenarios can show."""
+        first = next((row.rate for row in self.rows if row.split == ID), None)
+        if first is None or not any(row.change for row in self.rows):
+            return ""
+        least = smallest_visible_drop(first.value, first.scenarios)
+        what = f"{first.scenarios} scenarios show drops of"
+        return (
+            f"{what} {100 * least:.0f} points or more" if least else f"{first.scenarios} scenarios show no drop at all"
+        )
 
     @cached_property
     def clean(self) -> list[dict[str, Any]]:
@@ -92,7 +129,7 @@ class PolicyResult:
         """Its failures, the most frequent first."""
         found = Counter(
             (e["task"], e["split"], f"crashed: {e['crashed']}" if e.get("crashed") else e["reason"], e.get("phase", ""))
-            for e in self.evaluation.episodes
+            for e in self.clean
             if not e["success"]
         )
         return [Failure(self.settings.name, *about, count) for about, count in found.most_common()]
@@ -100,21 +137,21 @@ class PolicyResult:
     @cached_property
     def ways(self) -> list[Way]:
         """Its episodes that reached the goal without all means of their tasks, the most frequent first."""
-        found = Counter((e["task"], e["split"], e["lacks"]) for e in self.evaluation.episodes if otherwise(e))
+        found = Counter((e["task"], e["split"], e["lacks"]) for e in self.clean if otherwise(e))
         return [Way(self.settings.name, *about, count) for about, count in found.most_common()]
 
     @property
     def by_means(self) -> str:
         """How many episodes reached the goal by the means of their tasks; empty if all did."""
-        reached = [e for e in self.evaluation.episodes if e["success"] or otherwise(e)]
-        ways, every = sum(map(otherwise, reached)), len(self.evaluation.episodes)
+        reached = [e for e in self.clean if e["success"] or otherwise(e)]
+        ways, every = sum(map(otherwise, reached)), len(self.clean)
         said = f"the goal was reached in {len(reached)} of {every} episodes, in {len(reached) - ways} by the means"
-        return f"{self.settings.name}: {said}" if ways else ""
+        return said if ways else ""
 
     @property
     def headline(self) -> str:
         """The drop of all tasks together; empty without two sides."""
-        drop = self.lines[-1].difference
+        drop = self.lines[-1].difference if self.lines else None
         if drop is None:
             return ""
         low, high = 100 * drop.low, 100 * drop.high
@@ -140,6 +177,8 @@ class PolicyResult:
             "arms": list(self.evaluation.arms),
             "headline": self.headline,
             "table": plain(self.lines),
+            "conditions": [asdict(line) for line in self.conditions],
+            "interactions": [{**asdict(each), "told": str(each)} for each in self.interactions],
             "failures": [asdict(failure) for failure in self.failures],
             "otherwise": [asdict(way) for way in self.ways],
         }
@@ -152,23 +191,16 @@ class Comparison:
     results: Sequence[PolicyResult]
     """Result of each policy."""
 
-    @property
-    def head(self) -> list[str]:
-        """Titles of the columns."""
-        counts = [name for name in COUNTS if self._any(name)]
-        return ["", "split", *self._if_several("policy"), "ID", "OOD", "difference", *counts]
+    def table(self, digits: int = 0) -> tuple[list[str], list[list[str]], Mapping[str, str]]:
+        """The table: titles of the columns, rows of all policies, and what all rows have in common.
 
-    def rows(self) -> Iterator[list[str]]:
-        """The cells of the table: for each task and split, and each category, a row for each policy."""
-        order = dict.fromkeys((line.what, line.split) for result in self.results for line in result.lines)
-        tables = [{(line.what, line.split): line for line in result.lines} for result in self.results]
-        sections = [key for key in order if key != ("all", "all")] + [("all", "all")]
-        for key in sections:
-            for result, lines in zip(self.results, tables, strict=True):
-                if key in lines:
-                    what, split, *rates = cells(lines[key])
-                    counts = [str(getattr(lines[key], name)) for name in COUNTS if self._any(name)]
-                    yield [what, split, *self._if_several(result.settings.name), *rates, *counts]
+        Args:
+            digits: number of digits after the point.
+        """
+        every = [row for result in self.results for row in result.rows]
+        order = list(dict.fromkeys((row.task, row.split, row.condition) for row in every))
+        found = sorted(every, key=lambda row: order.index((row.task, row.split, row.condition)))
+        return shown([row.cells(digits) for row in found])
 
     @property
     def failure_head(self) -> list[str]:
@@ -193,8 +225,8 @@ class Comparison:
 
     @property
     def headlines(self) -> list[str]:
-        """The drop of each policy that has both sides, and how many of its successes were by the means."""
-        return [line for result in self.results for line in (result.headline, result.by_means) if line]
+        """What the tables of the policies say in words."""
+        return [line for result in self.results for line in result.sentences if line]
 
     def plain(self, folder: Path) -> Mapping[str, Any]:
         """The comparison as plain data; that of one policy alone is its result.
@@ -217,14 +249,13 @@ class Comparison:
         settings = self.results[0].settings
         names = ", ".join(f"`{result.settings.name}`" for result in self.results)
         settling = "" if settings.settle else ", goals counted at once"
-        head = (
-            f"{names}: success in percent [95 % interval], {settings.seeds} scenarios a pool, "
-            f"{settings.rollouts} rollouts each, {settings.rules} rules{settling}"
-        )
+        head = f"{names}: success in percent [95 % interval], n scenarios x rollouts, {settings.rules} rules{settling}"
         if settings.edition:
             edition = edition_told(settings.edition)
             head += f", edition {edition['name']} (sha256 {edition['sha256'][:12]})"
-        parts = [head, _table(self.head, self.rows())]
+        titles, cells, common = self.table(1)
+        head += "".join(f", {name} {value}" for name, value in common.items() if name == "task")
+        parts = [head, _table(titles, cells)]
         if self.headlines:
             parts.append("\n".join(f"* {_escaped(line)}" for line in self.headlines))
         if rows := list(self.way_rows()):
@@ -238,10 +269,6 @@ class Comparison:
     def _if_several(self, cell: str) -> list[str]:
         """A cell of a column that only a comparison of several policies has."""
         return [cell] if len(self.results) > 1 else []
-
-    def _any(self, name: str) -> bool:
-        """Whether a count of the table is above 0 in any result."""
-        return any(getattr(result.lines[-1], name) for result in self.results)
 
 
 def edition_told(name: str) -> dict[str, str]:

@@ -12,23 +12,37 @@ from ..samplers.split import ID
 from ..samplers.task_files import about as about_task
 from ..validate.playable import unplayable
 from ..work.parallel import Workers
-from .settings import PAPER, EvaluateSettings
+from .settings import PAPER, SCENARIOS, EvaluateSettings
 
 Scenarios = Mapping[tuple[str, str], Mapping[str, Any]]
 """What lines say of scenarios, by the pool's folder and the scenario's id."""
 
 
 def chosen(pools: Sequence[Pool], settings: EvaluateSettings, search: Sequence[str]) -> Scenarios:
-    """The first scenarios of each pool, of the chosen splits.
+    """The first scenarios of each pool, of the chosen splits, the same number of each.
 
     Raises:
-        BadConfig: a pool holds fewer, or none of them has one of the splits.
+        BadConfig: a pool holds fewer than requested, or none of them has one of the splits.
     """
-    found = {key: told for pool in pools for key, told in _first(pool, settings, search).items()}
-    if not found:
+    some = [_of_splits(pool, settings, search) for pool in pools]
+    counts = {str(pool.folder): len(own) for pool, own in zip(pools, some, strict=True) if own}
+    if not counts:
         named = ", ".join(sorted({split for pool in pools for split in pool.kinds("split")[0]}))
         raise BadConfig(f"splits = {settings.splits}; these pools have none of them, but {named}; pass splits=all")
-    return found
+    count = settings.seeds or min(SCENARIOS, *counts.values())
+    for folder, there in counts.items():
+        if there < count:
+            raise BadConfig(f"seeds = {count}, but {folder} holds {there} scenarios; pass seeds={there}")
+    return {key: told for own in some for key, told in itertools.islice(own.items(), count)}
+
+
+def different_sizes(pools: Sequence[Pool], settings: EvaluateSettings) -> str:
+    """A line about pools of which more scenarios could be played if all had as many; empty if there are none."""
+    sizes = {str(pool.folder): len(pool) for pool in pools}
+    if settings.seeds or len({min(SCENARIOS, size) for size in sizes.values()}) < 2:
+        return ""
+    told = ", ".join(f"{folder} {size}" for folder, size in sizes.items())
+    return f"pools differ in size ({told}): {min(sizes.values())} scenarios of each are played"
 
 
 def known(pool: Pool, search: Sequence[str]) -> Scenarios:
@@ -50,20 +64,16 @@ def not_playable(pools: Sequence[Pool], some: Scenarios, workers: Workers) -> di
     return dict(unplayable(rows, workers))
 
 
-def _first(pool: Pool, settings: EvaluateSettings, search: Sequence[str]) -> Scenarios:
-    """The first scenarios of a pool, of the chosen splits.
+def _of_splits(pool: Pool, settings: EvaluateSettings, search: Sequence[str]) -> Scenarios:
+    """The scenarios of a pool of the chosen splits.
 
     Raises:
-        BadConfig: the pool holds fewer.
+        BadConfig: the pool is empty.
     """
     if not len(pool):
         raise BadConfig(f"{pool.folder} holds no scenario; choose another pool")
     every = known(pool, search)
-    wanted = {key: a for key, a in every.items() if _is_wanted(a["task"], a["split"], settings.splits, search)}
-    if wanted and len(wanted) < settings.seeds:
-        remedy = f"pass seeds={len(wanted)}"
-        raise BadConfig(f"seeds = {settings.seeds}, but {pool.folder} holds {len(wanted)} scenarios; {remedy}")
-    return dict(itertools.islice(wanted.items(), settings.seeds))
+    return {key: a for key, a in every.items() if _is_wanted(a["task"], a["split"], settings.splits, search)}
 
 
 def _is_wanted(task: str, split: str, splits: str, search: Sequence[str]) -> bool:

@@ -29,6 +29,8 @@ EPISODES = "episodes"
 """Value of `keep` for keeping the actions of all episodes."""
 SPLITS = (ALL, PAPER)
 """Names of sets of splits."""
+SCENARIOS = 20
+"""Number of scenarios of each pool by default, as in the paper; all of the smallest pool if it holds fewer."""
 MAX_FOLDER_NAME = 100
 """Largest length of the name of a folder that is made from the names of policies."""
 
@@ -41,7 +43,7 @@ class EvaluateSettings:
     pool: str | list[str] | None = None
     edition: str | None = None
     tasks: str | list[str] | None = None
-    seeds: int = 20
+    seeds: int | None = None
     rollouts: int = 5
     observations: list[str] | None = None
     width: int = 256

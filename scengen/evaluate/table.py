@@ -1,5 +1,6 @@
 """The table of an evaluation: success in and out of distribution, with intervals."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -133,8 +134,20 @@ def _values(episodes: Sequence[Mapping[str, Any]], name: str) -> list[str]:
     return list(dict.fromkeys(e[name] for e in episodes))
 
 
-def percent(rate: Rate | Difference | None, sign: str = "") -> str:
+def percent(rate: Rate | Difference | None, sign: str = "", digits: int = 1) -> str:
     """A rate with its interval in percent, as text."""
     if rate is None:
         return "-"
-    return f"{100 * rate.value:{sign}.1f} [{100 * rate.low:{sign}.1f}, {100 * rate.high:{sign}.1f}]"
+    value, low, high = (f"{100 * each:{sign}.{digits}f}" for each in (rate.value, rate.low, rate.high))
+    return f"{value} [{low}, {high}]"
+
+
+def distinct(lines: Sequence[TableLine], category: Mapping[str, str]) -> list[TableLine]:
+    """Lines without those that repeat another one: means over one task, or over one category.
+
+    Args:
+        category: category of each task.
+    """
+    tasks = Counter(category.values())
+    means = {name for name, count in tasks.items() if count > 1} | ({"all"} if len(tasks) > 1 else set())
+    return [line for line in lines if line.what in category or line.what in means]

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...compose import load_task
@@ -11,6 +12,7 @@ from ...evaluate.comparison import MAX_SHOWN, Comparison, PolicyResult
 from ...evaluate.edition import Edition, check_pool, chosen_sets, evaluation_pools
 from ...evaluate.policies import find_policy
 from ...evaluate.rollouts import Evaluation, evaluate
+from ...evaluate.scenarios import different_sizes
 from ...evaluate.settings import EvaluateSettings, other_version
 from ...pool import Pool
 from ...runs.progress import ProgressBar
@@ -30,6 +32,8 @@ def command(arguments: Arguments) -> int:
         folders = _edition_pools(settings, settings.edition)
         settings = replace(settings, pool=folders)
         every = settings.several()
+    if told := different_sizes([*map(Pool.open, settings.folders)], settings):
+        remark(told)
     results, search = [], search_path(arguments)
     for one in every:
         if difference := other_version(one, search):
@@ -81,24 +85,29 @@ def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None],
 
 def _show(compared: Comparison, settings: EvaluateSettings) -> None:
     """Print the tables and the headlines."""
-    title = f"{', '.join(one.name for one in settings.several())}: success [%], {settings.rules} rules"
-    shown = Table(*compared.head, title=title, title_justify="left")
-    for row in compared.rows():
-        shown.add_row(*row)
-    out.print(shown)
+    titles, cells, common = compared.table()
+    what = ", ".join([*([common["task"]] if "task" in common else []), *(one.name for one in settings.several())])
+    out.print(_table(f"{what}: success [%], {settings.rules} rules", titles, cells))
+    if "change" in titles:
+        say("change: to training, twin by twin if there are twins; under a condition, to the same clean episodes")
     for title, head, rows in (
         ("goal reached otherwise than by the means of the task", compared.way_head, [*compared.way_rows()]),
         ("failures", compared.failure_head, [*compared.failure_rows()]),
     ):
         if rows:
-            why = Table(*head, title=title, title_justify="left")
-            for row in rows[:MAX_SHOWN]:
-                why.add_row(*row)
-            out.print(why)
+            out.print(_table(title, head, rows[:MAX_SHOWN]))
         if (more := len(rows) - MAX_SHOWN) > 0:
             say(f"{more} more lines are in table.md")
     for line in compared.headlines:
         say(line)
+
+
+def _table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """A table without lines between columns, so that it fits 80 columns."""
+    table = Table(*head, title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 def _report(result: PolicyResult) -> bool:
