@@ -242,7 +242,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._row.instruction if self._instruction is None else self._instruction
 
     def instruct(self, text: str | None) -> None:
-        """Give another instruction than that of the running scenario; None for its own."""
+        """Replace the instruction of the running scenario; None restores it."""
         self._instruction = text
 
     @property

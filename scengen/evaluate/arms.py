@@ -1,4 +1,4 @@
-"""Arms of an evaluation: the same episodes with something taken away or exchanged, to tell what a policy uses.
+"""Arms of an evaluation: the same episodes with something taken away or exchanged, to measure which inputs a policy uses.
 
 * `blind`: all pictures are black.
 * `wrong`: the instruction is that of another task.
@@ -98,7 +98,7 @@ ARMS: Mapping[str, Arm] = {
 
 
 def check_arms(names: Iterable[str]) -> None:
-    """Raise `UnknownName` for a name that is no arm."""
+    """Raise `UnknownName` for an unknown name."""
     for name in names:
         if name not in ARMS:
             raise UnknownName("arm", name, [*ARMS, AUTO, NONE])

@@ -96,7 +96,7 @@ class PolicyResult:
 
     @property
     def sentences(self) -> Iterator[str]:
-        """What its table says in words: the drop, what is used, interactions, the means, what so few could not show."""
+        """Sentences about its table: the drop, what is used, interactions, the means, what so few could not show."""
         yield self.headline
         before = {(row.task, row.split): row.rate for row in self.rows if not row.condition}
         for told in (*arm_sentences(self.conditions, before), *self.interactions, self.by_means, self._visible):
@@ -225,7 +225,7 @@ class Comparison:
 
     @property
     def headlines(self) -> list[str]:
-        """What the tables of the policies say in words."""
+        """Sentences about the tables of the policies."""
         return [line for result in self.results for line in result.sentences if line]
 
     def plain(self, folder: Path) -> Mapping[str, Any]:

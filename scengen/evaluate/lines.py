@@ -212,7 +212,7 @@ def read_lines(path: Path) -> list[Any]:
     """What the lines of a file hold, as plain data.
 
     Raises:
-        BadConfig: the file is missing, or a line is no JSON.
+        BadConfig: the file is missing, or a line is not JSON.
     """
     try:
         return [read_json(line.decode()) for line in read_plain(path, MAX_JOURNAL).splitlines()]
