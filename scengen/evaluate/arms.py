@@ -1,4 +1,4 @@
-"""Arms of an evaluation: the same episodes with something taken away or exchanged, to measure which inputs a policy uses.
+"""Arms of an evaluation: the same episodes with an input taken away or exchanged, to measure whether it is used.
 
 * `blind`: all pictures are black.
 * `wrong`: the instruction is that of another task.

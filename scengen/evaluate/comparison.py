@@ -12,12 +12,13 @@ from typing import Any
 from ..perturb.perturbation import NONE
 from ..samplers.split import ID
 from .arms import CLEAN
-from .conditions import ConditionLine, Interaction, arm_sentences, condition_lines, interactions
+from .conditions import ConditionLine, Interaction, arm_sentences, condition_lines, interactions, unchanged
 from .edition import Edition
+from .latex import FILE, latex
 from .lines import CSV, as_csv
 from .rollouts import Evaluation
 from .rows import Row, rows, shown
-from .settings import EvaluateSettings
+from .settings import LATEX, EvaluateSettings
 from .statistics import smallest_visible_drop
 from .table import TableLine, distinct, otherwise, plain, table
 
@@ -99,7 +100,8 @@ class PolicyResult:
         """Sentences about its table: the drop, what is used, interactions, the means, what so few could not show."""
         yield self.headline
         before = {(row.task, row.split): row.rate for row in self.rows if not row.condition}
-        for told in (*arm_sentences(self.conditions, before), *self.interactions, self.by_means, self._visible):
+        arms = arm_sentences(self.conditions, before)
+        for told in (*arms, *unchanged(self.conditions), *self.interactions, self.by_means, self._visible):
             yield f"{self.settings.name}: {told}" if told else ""
 
     @property
@@ -197,10 +199,7 @@ class Comparison:
         Args:
             digits: number of digits after the point.
         """
-        every = [row for result in self.results for row in result.rows]
-        order = list(dict.fromkeys((row.task, row.split, row.condition) for row in every))
-        found = sorted(every, key=lambda row: order.index((row.task, row.split, row.condition)))
-        return shown([row.cells(digits) for row in found])
+        return shown([row.cells(digits) for row in self.rows])
 
     @property
     def failure_head(self) -> list[str]:
@@ -241,7 +240,21 @@ class Comparison:
         """Content of the files of the comparison: tables, and the lines of each policy without JSON."""
         lines = {result.settings.folder / CSV: as_csv(result.evaluation.episodes) for result in self.results}
         told = json.dumps(self.plain(folder), indent=1, allow_nan=False) + "\n"
-        return {**lines, folder / TABLE: told, folder / MARKDOWN: self.markdown}
+        in_latex = LATEX in self.results[0].settings.format
+        more = {folder / FILE: latex(self.rows, self.category)} if in_latex else {}
+        return {**lines, folder / TABLE: told, folder / MARKDOWN: self.markdown, **more}
+
+    @property
+    def category(self) -> dict[str, str]:
+        """Category of each task."""
+        return {e["task"]: e["category"] for result in self.results for e in result.clean}
+
+    @property
+    def rows(self) -> list[Row]:
+        """The rows of all policies, those about the same episodes next to each other."""
+        every = [row for result in self.results for row in result.rows]
+        order = list(dict.fromkeys((row.task, row.split, row.condition) for row in every))
+        return sorted(every, key=lambda row: order.index((row.task, row.split, row.condition)))
 
     @property
     def markdown(self) -> str:

@@ -25,6 +25,10 @@ ALL = "all"
 """Name of all splits of the pools."""
 PAPER = "paper"
 """Name of the training split and the OOD conditions of the paper (App. I)."""
+LATEX = "latex"
+"""Value of `format` for tables in LaTeX."""
+PROFILE = "profile"
+"""Value of `format` for plots of the profile of each policy."""
 EPISODES = "episodes"
 """Value of `keep` for keeping the actions of all episodes."""
 SPLITS = (ALL, PAPER)
@@ -63,6 +67,7 @@ class EvaluateSettings:
     perturb: str | list[str] | None = None
     perturb_seed: int = 0
     arms: str | list[str] = AUTO
+    format: list[str] = field(default_factory=list)
 
     @cached_property
     def folders(self) -> list[str]:
@@ -145,6 +150,9 @@ class EvaluateSettings:
         check_rules(self.rules)
         check_arms(self.chosen_arms or ())
         self.perturbations  # noqa: B018  (it raises an error)
+        for name in self.format:
+            if name not in (LATEX, PROFILE):
+                raise UnknownName("format", name, (LATEX, PROFILE))
         if self.splits not in SPLITS:
             raise UnknownName("splits", self.splits, SPLITS)
         at_least(self, seeds=1, rollouts=1, workers=1, width=1, height=1, perturb_seed=0)

@@ -13,7 +13,7 @@ from ...evaluate.edition import Edition, check_pool, chosen_sets, evaluation_poo
 from ...evaluate.policies import find_policy
 from ...evaluate.rollouts import Evaluation, evaluate
 from ...evaluate.scenarios import different_sizes
-from ...evaluate.settings import EvaluateSettings, other_version
+from ...evaluate.settings import PROFILE, EvaluateSettings, other_version
 from ...pool import Pool
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
@@ -44,6 +44,11 @@ def command(arguments: Arguments) -> int:
     _show(compared, settings)
     for path, text in compared.files(settings.folder).items():
         write(path, text)
+    if PROFILE in settings.format:
+        from ...evaluate.profile import plots  # only here: matplotlib starts slowly
+
+        for path, content in plots(compared).items():
+            write(path, content)
     incomplete = [_report(result) for result in results]
     if len(results) > 1:
         for result in results:
