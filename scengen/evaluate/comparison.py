@@ -78,7 +78,11 @@ class PolicyResult:
     @cached_property
     def lines(self) -> list[TableLine]:
         """The lines of its table, without means that repeat another line."""
-        return distinct(table(self.clean), {e["task"]: e["category"] for e in self.clean})
+        return distinct(self._every_line, {e["task"]: e["category"] for e in self.clean})
+
+    @cached_property
+    def _every_line(self) -> list[TableLine]:
+        return table(self.clean)
 
     @cached_property
     def conditions(self) -> list[ConditionLine]:
@@ -153,7 +157,7 @@ class PolicyResult:
     @property
     def headline(self) -> str:
         """The drop of all tasks together; empty without two sides."""
-        drop = self.lines[-1].difference if self.lines else None
+        drop = self._every_line[-1].difference
         if drop is None:
             return ""
         low, high = 100 * drop.low, 100 * drop.high

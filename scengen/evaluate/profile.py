@@ -16,8 +16,12 @@ from .statistics import Rate
 
 PROFILES = {"profile.svg": False, "profile_dark.svg": True}
 """Files of a profile, and whether each is for a dark page."""
-WIDTH, HEIGHT, MARGIN = 5.5, 0.24, 0.9
-"""Width of the plot, height of a line, and height of title and axis [inches]."""
+PLOT_WIDTH = 5.5
+"""Width of the plot without its labels [inches]."""
+LINE_HEIGHT = 0.24
+"""Height of a line [inches]."""
+FRAME_HEIGHT = 0.9
+"""Height of title and axis together [inches]."""
 COLOURS = {False: ("#1f2328", "#0969da", "#d0d7de"), True: ("#e6edf3", "#58a6ff", "#30363d")}
 """Colours of text, rates and guides, for light and dark pages."""
 
@@ -65,7 +69,7 @@ def profile_lines(rows: Sequence[Row], category: Mapping[str, str]) -> list[Line
 def profile(policy: str, lines: Sequence[Line], dark: bool = False) -> bytes:
     """The plot as SVG: a rate with its 95 % interval on each line, in groups."""
     text, accent, guide = COLOURS[dark]
-    figure = Figure((WIDTH, MARGIN + HEIGHT * len(lines)))
+    figure = Figure((PLOT_WIDTH, FRAME_HEIGHT + LINE_HEIGHT * len(lines)))
     axes = figure.add_subplot()
     for place, line in enumerate(lines):
         value, low, high = (100 * each for each in (line.rate.value, line.rate.low, line.rate.high))

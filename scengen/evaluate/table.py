@@ -1,6 +1,5 @@
 """The table of an evaluation: success in and out of distribution, with intervals."""
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -148,6 +147,17 @@ def distinct(lines: Sequence[TableLine], category: Mapping[str, str]) -> list[Ta
     Args:
         category: category of each task.
     """
-    tasks = Counter(category.values())
-    means = {name for name, count in tasks.items() if count > 1} | ({"all"} if len(tasks) > 1 else set())
-    return [line for line in lines if line.what in category or line.what in means]
+    found = [line for line in lines if line.what in category]
+    for line in (line for line in lines if line.what not in category):
+        if not any(_repeats(line, other) for other in found):
+            found.append(line)
+    return found
+
+
+def _repeats(line: TableLine, other: TableLine) -> bool:
+    """Whether a mean has the rates of another line, as that of one task has."""
+
+    def numbers(rate: Rate | None) -> tuple[float, ...]:
+        return () if rate is None else (rate.scenarios, rate.rollouts, round(rate.value, 9))
+
+    return (numbers(line.id), numbers(line.ood)) == (numbers(other.id), numbers(other.ood))
