@@ -12,7 +12,7 @@ from typing import Any
 from ..perturb.perturbation import NONE
 from ..samplers.split import ID
 from .arms import CLEAN
-from .conditions import ConditionLine, Interaction, arm_sentences, condition_lines, interactions, unchanged
+from .conditions import ConditionLine, Interaction, arm_sentences, condition_lines, interactions, without_effect
 from .edition import Edition
 from .latex import FILE, latex
 from .lines import CSV, as_csv
@@ -104,8 +104,11 @@ class PolicyResult:
         """Sentences about its table: the drop, what is used, interactions, the means, what so few could not show."""
         yield self.headline
         before = {(row.task, row.split): row.rate for row in self.rows if not row.condition}
+        same = without_effect(self.conditions)
+        unchanged = [f"{task}: no action changes under {', '.join(names)}" for task, names in same.items()]
+        together = [one for one in self.interactions if not {one.one, one.other} & {*same.get(one.task, ())}]
         arms = arm_sentences(self.conditions, before)
-        for told in (*arms, *unchanged(self.conditions), *self.interactions, self.by_means, self._visible):
+        for told in (*arms, *unchanged, *together, self.by_means, self._visible):
             yield f"{self.settings.name}: {told}" if told else ""
 
     @property

@@ -170,14 +170,14 @@ def arm_sentences(lines: Sequence[ConditionLine], clean: Mapping[tuple[str, str]
             yield f"{line.task}, {line.split}: {_use(line, VERBS[arm.needs])}: {told}"
 
 
-def unchanged(lines: Sequence[ConditionLine]) -> Iterator[str]:
-    """Perturbations under which a policy acts as without them, in every episode."""
-    for task in dict.fromkeys(line.task for line in lines):
-        own = [line for line in lines if line.task == task and line.condition not in ARMS]
-        names = dict.fromkeys(line.condition for line in own)
-        same = [n for n in names if all(x.same_actions == x.rate.rollouts for x in own if x.condition == n)]
-        if same:
-            yield f"{task}: no action changes under {', '.join(same)}"
+def without_effect(lines: Sequence[ConditionLine]) -> dict[str, list[str]]:
+    """Perturbations under which a policy acts as without them in every episode, by task."""
+    found: dict[str, list[str]] = {}
+    for task, name in dict.fromkeys((line.task, line.condition) for line in lines if line.condition not in ARMS):
+        own = [line for line in lines if (line.task, line.condition) == (task, name)]
+        if all(line.same_actions == line.rate.rollouts for line in own):
+            found.setdefault(task, []).append(name)
+    return found
 
 
 def _use(line: ConditionLine, what: str) -> str:
