@@ -8,7 +8,8 @@ import helpers
 import pytest
 
 from scengen import cli
-from scengen.evaluate.audit import Options, _Audit, audit
+from scengen.evaluate.audit import _Audit, audit
+from scengen.evaluate.audit_report import Options
 from scengen.evaluate.comparison import TABLE, Comparison
 from scengen.evaluate.lines import COLUMNS, RUN, EpisodeLine, picture_digest, read_lines, renewed, schema
 from scengen.evaluate.rollouts import order

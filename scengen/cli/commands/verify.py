@@ -15,8 +15,9 @@ from ...attack.check import attacked
 from ...attack.evidence import Hit, unsound
 from ...demos.verify import verify_demonstrations
 from ...errors import BadConfig, UnknownName, cut
-from ...evaluate.audit import SAMPLE, audit
-from ...evaluate.audit import Options as AuditOptions
+from ...evaluate.audit import audit
+from ...evaluate.audit_report import SAMPLE
+from ...evaluate.audit_report import Options as AuditOptions
 from ...evidence.reproduction import LIMITS as REPRODUCTION_LIMITS
 from ...evidence.reproduction import reproduced
 from ...ood.analysis.redraw import task_of
