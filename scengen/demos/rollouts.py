@@ -40,7 +40,7 @@ class Keeper:
         if twice := {name for name in names if names.count(name) > 1}:
             raise BadConfig(f"several pools are in folders named {twice.pop()}; rename one to keep their episodes")
         self.settings = settings
-        self._pools = {str(pool.folder): pool for pool in map(Pool.open, settings.folders)}
+        self._pools = {str(pool.folder): pool for pool in map(Pool.open, settings.every_folder)}
         self._tasks = {name: task_of_manifest(pool, tasks[pool.task]) for name, pool in self._pools.items()}
         self._kept: dict[Path, _PoolKeeper] = {}
         for folder, pool in self._pools.items():

@@ -2,9 +2,10 @@
 
 * `blind`: all pictures are black.
 * `wrong`: the instruction is that of another task.
+* `benign`: fresh training scenarios, see `evaluate.benign`. Nothing is taken away.
 * `reworded`: the instruction is another wording of the task's own, from `conf/language/<task>.yaml`.
 
-The physics, the scenario and the random numbers of the policy are those of the clean episode.
+But for `benign`, scenario, physics and random numbers of the policy are those of the clean episode.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -24,6 +25,8 @@ CLEAN = "clean"
 """Name of the arm without an intervention."""
 AUTO = "auto"
 """Value of `arms` for those that ask about an input that the policy has."""
+BENIGN = "benign"
+"""Name of the arm of fresh training scenarios."""
 NONE = "none"
 """Value of `arms` for no arm."""
 PICTURES = "pictures"
@@ -38,7 +41,7 @@ class Arm:
 
     name: str
     needs: str
-    """Input of the policy that it changes: `pictures` or `language`."""
+    """Input of the policy that it changes: `pictures` or `language`; empty if it is none."""
     title: str
     """What the policy gets, for sentences."""
     automatic: bool = True
@@ -91,6 +94,7 @@ ARMS: Mapping[str, Arm] = {
     for arm in (
         Arm("blind", PICTURES, "black pictures"),
         Arm("wrong", LANGUAGE, "the instruction of another task", instruct=wrong_instruction),
+        Arm(BENIGN, "", "fresh training scenarios", False),
         Arm("reworded", LANGUAGE, "another wording of the instruction", False, reworded_instruction),
     )
 }

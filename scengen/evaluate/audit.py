@@ -26,7 +26,7 @@ from .claims import Fault, broken, incomplete, malformed, untrue
 from .comparison import TABLE, Comparison, PolicyResult
 from .lines import CHAIN, CSV, FORMAT, RUN, kept_folder, read_lines
 from .rebuilding import Rebuilder, Rebuilt, lost
-from .rollouts import Evaluation, armed, here, id_of, order, perturbed, wanted
+from .rollouts import Evaluation, here, id_of, order, wanted
 from .scenarios import Scenarios, chosen, known, not_playable
 from .settings import EvaluateSettings, RolloutId
 
@@ -125,21 +125,25 @@ class _Audit:
         self.report, self.sampled = ResultsReport(str(self.folder), len(self.lines)), 0
         self._actions: dict[Path, dict[tuple[str, int], Actions]] = {}
         given = [Pool.open(folder).check() for folder in options.pools]
-        self.pools = {name: _pool_here(name, sha256, given) for name, sha256 in self.of_run["pools"].items()}
+        named = {**self.of_run["pools"], **stored.get("benign", {})}
+        self.pools = {name: _pool_here(name, sha256, given) for name, sha256 in named.items()}
 
     @cached_property
     def settings(self) -> EvaluateSettings:
         """Settings of the run, with the folders in which the pools are here."""
         names = [name for name in self.of_run if name in vars(self.told) and name != "policy"]
-        folders = [str(pool.folder) for pool in self.pools.values()]
-        return replace(self.told, pool=folders, **{name: self.of_run[name] for name in names})
+        here = {name: str(pool.folder) for name, pool in self.pools.items()}
+        fresh = [here[name] for name in self.stored.get("benign", {})]
+        usual = [here[name] for name in self.of_run["pools"]]
+        return replace(self.told, pool=usual, benign=fresh, **{name: self.of_run[name] for name in names})
 
     @property
     def result(self) -> PolicyResult:
         """The result that the lines give."""
         lines = sorted((line for line in self.lines if id_of(line) in self.wanted), key=order)
         arms = self.stored.get("arms", [])
-        return PolicyResult(self.told, Evaluation(lines, 0, self.lost, arms, self.lines[-1][CHAIN] if lines else ""))
+        end = self.lines[-1][CHAIN] if lines else ""
+        return PolicyResult(self.told, Evaluation(lines, 0, self.lost, arms, self.stored.get("benign", {}), end))
 
     def run(self, progress: Callable[[int, int], None]) -> None:
         """Check form, order, completeness and claims of all lines, and rebuild a sample."""
@@ -167,7 +171,7 @@ class _Audit:
     def wanted(self) -> set[RolloutId]:
         """The rollouts of the table."""
         about = {key: told for key, told in self._chosen.items() if key[1] not in self.lost}
-        return wanted(about, self.told, [*perturbed(self.told), *armed(self.stored.get("arms", []))])
+        return wanted(about, self.told) | wanted(about, self.told, self.stored.get("arms", []))
 
     @cached_property
     def lost(self) -> dict[str, str]:
@@ -176,7 +180,10 @@ class _Audit:
 
     @cached_property
     def _chosen(self) -> Scenarios:
-        return self._as_named(chosen([*self.pools.values()], self.settings, self.options.search))
+        fresh = self.stored.get("benign", {})
+        sides = [[p for name, p in self.pools.items() if (name in fresh) == side] for side in (False, True)]
+        some = (chosen(pools, self.settings, self.options.search) for pools in sides if pools)
+        return self._as_named({key: told for each in some for key, told in each.items()})
 
     @cached_property
     def _every(self) -> Scenarios:
@@ -197,7 +204,8 @@ class _Audit:
             if text := load_task(task, self.options.search).other_version("played on", version):
                 self.report.declined.append(text)
         here = {str(pool.folder): pool for pool in self.pools.values()}
-        left_out = {key: a for key, a in chosen([*here.values()], self.settings, ()).items() if key[1] in self.lost}
+        every = (known(pool, self.options.search) for pool in here.values())
+        left_out = {key: told for some in every for key, told in some.items() if key[1] in self.lost}
         fails = not_playable([*here.values()], left_out, self.options.workers) if left_out else {}
         for id_ in sorted(self.lost):
             if id_ not in fails:

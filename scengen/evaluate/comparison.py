@@ -184,6 +184,7 @@ class PolicyResult:
             "episodes_sha256": self.evaluation.chain,
             "lost": dict(self.evaluation.lost),
             "arms": list(self.evaluation.arms),
+            "benign": dict(self.evaluation.benign),
             "headline": self.headline,
             "table": plain(self.lines),
             "conditions": [asdict(line) for line in self.conditions],

@@ -7,9 +7,9 @@ from typing import Any
 
 from ..perturb.perturbation import NONE
 from ..samplers.split import ID
-from .arms import ARMS, CLEAN, LANGUAGE, PICTURES
+from .arms import ARMS, BENIGN, CLEAN, LANGUAGE, PICTURES
 from .settings import Condition
-from .statistics import Difference, Rate, contrast, paired, rate
+from .statistics import Difference, Rate, contrast, difference, paired, rate
 from .table import otherwise, percent
 
 Cell = Mapping[tuple[int, int], Sequence[bool]]
@@ -92,6 +92,8 @@ def _condition_line(
         return None
     shared = [key for key in found if key in before]
     apart = paired([found[key] for key in shared], [before[key] for key in shared]) if len(shared) > 1 else None
+    if condition.arm == BENIGN and before:
+        apart = difference(rate([*found.values()]), rate([*before.values()]))
     twins = [(e, clean[key]) for e in own if (key := (e["scenario"], e["rollout"])) in clean]
     same = sum(e["actions_sha256"] == twin["actions_sha256"] != "" for e, twin in twins)
     counts = sum(bool(e["crashed"]) for e in own), sum(map(otherwise, own))
@@ -167,7 +169,8 @@ def arm_sentences(lines: Sequence[ConditionLine], clean: Mapping[tuple[str, str]
         if line.condition in ARMS and line.difference is not None:
             arm, before = ARMS[line.condition], clean[line.task, line.split]
             told = f"{arm.title} {_of(line.rate)}, clean {_of(before)}"
-            yield f"{line.task}, {line.split}: {_use(line, VERBS[arm.needs])}: {told}"
+            what = _use(line, VERBS[arm.needs]) if arm.needs else f"by chance {percent(line.difference, '+', 0)} points"
+            yield f"{line.task}, {line.split}: {what}: {told}"
 
 
 def without_effect(lines: Sequence[ConditionLine]) -> dict[str, list[str]]:

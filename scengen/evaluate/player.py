@@ -170,7 +170,8 @@ class PolicyPlayer:
             remote = settings.remote
             observed = remote.streams(load_task(task, self.search).embodiment) if remote else settings.observations
             envs = environments(settings, task, perturbation, observed, self.search, self.threads)
-            memory = _training(folders_of(settings, task)) if settings.name == REPLAY else None
+            own = [folder for folder in folders_of(settings, task) if folder not in settings.benign]
+            memory = _training(own) if settings.name == REPLAY else None
             factory = find_policy(settings.name, memory, settings.remote)
             made = [make_policy(settings.name, factory, env) for env in envs.envs]
             self._running = (task, perturbation), envs, made
@@ -190,7 +191,7 @@ class PolicyPlayer:
 
 def folders_of(settings: EvaluateSettings, task: str) -> list[str]:
     """Folders of the pools of a task."""
-    return [folder for folder in settings.folders if task in Pool.open(folder).kinds("task")[0]]
+    return [folder for folder in settings.every_folder if task in Pool.open(folder).kinds("task")[0]]
 
 
 def environments(

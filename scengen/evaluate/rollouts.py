@@ -23,7 +23,7 @@ from ..work.log import Log
 from ..work.machine import cores
 from ..work.parallel import each
 from ..work.targets import refused, try_folder
-from .arms import ARMS, LANGUAGE, PICTURES
+from .arms import ARMS, BENIGN, LANGUAGE, PICTURES
 from .lines import CHAIN, COLUMNS, FORMAT, RUN, chained, renewed, run_sha256
 from .player import PolicyPlayer, policy_seed
 from .scenarios import Scenarios, chosen, not_playable
@@ -45,6 +45,8 @@ class Evaluation:
     """Scenarios that were left out because they cannot be played within the limits, with the reasons."""
     arms: Sequence[str] = ()
     """Arms that were played in addition to the clean run."""
+    benign: Mapping[str, str] = field(default_factory=dict)
+    """Hashes of the pools of the arm `benign`, by folder."""
     chain: str = ""
     """Hash at the end of the file of episodes, see `lines.chained`."""
 
@@ -73,8 +75,9 @@ def evaluate(
     kinds.check_target(settings.folder, kinds.EPISODES)
     try_folder(settings.folder)
     pools = [Pool.open(folder).check() for folder in settings.folders]
-    about = chosen(pools, settings, search)
-    lost = not_playable(pools, about, settings.workers)
+    fresh = [Pool.open(folder).check() for folder in settings.benign]
+    about = {**chosen(pools, settings, search), **(chosen(fresh, settings, search) if fresh else {})}
+    lost = not_playable([*pools, *fresh], about, settings.workers)
     if not (about := {key: told for key, told in about.items() if key[1] not in lost}):
         raise PoolError(f"no scenario can be played; see scengen verify: {'; '.join(lost.values())}")
     path = settings.folder / kinds.EPISODES
@@ -90,10 +93,11 @@ def evaluate(
             _move_aside(path)
         with Log(path, depends, remedy, settings.folder / RUN) as log:
             run = _Run(settings, player, about, log, keep, progress)
-            run.play(wanted(about, settings, perturbed(settings)))
-            run.play(wanted(about, settings, armed(arms := run.arms())))
+            run.play(wanted(about, settings))
+            run.play(wanted(about, settings, arms := run.arms()))
             run.sort()
-            return Evaluation(run.lines(), run.earlier, lost, arms, run.chain)
+            pinned = {str(pool.folder): pool.sha256 for pool in fresh}
+            return Evaluation(run.lines(), run.earlier, lost, arms, pinned, run.chain)
 
 
 @dataclass
@@ -166,28 +170,22 @@ def here() -> dict[str, Any]:
     return {"machine": fingerprint(), "scengen": found["scengen"], "mujoco": found["mujoco"]}
 
 
-def wanted(about: Scenarios, settings: EvaluateSettings, conditions: Sequence[Condition]) -> set[RolloutId]:
-    """Rollouts of some scenarios under some conditions.
+def wanted(about: Scenarios, settings: EvaluateSettings, arms: Sequence[str] | None = None) -> set[RolloutId]:
+    """Rollouts of some scenarios: clean and perturbed ones, or those of some arms.
 
     Args:
         about: folders of pools and ids of scenarios, with what is known of them.
+        arms: names of the arms.
     """
+    plain = [Condition(each) for each in (NO_PERTURBATION, *settings.perturbations)]
+    usual = plain if arms is None else [Condition(arm=arm) for arm in arms if arm != BENIGN]
+    fresh = [Condition(arm=arm) for arm in arms or () if arm == BENIGN]
     return {
         RolloutId(told["task"], each.perturbation, each.arm, *key, k)
         for key, told in about.items()
-        for each in conditions
+        for each in (fresh if key[0] in settings.benign else usual)
         for k in range(settings.rollouts)
     }
-
-
-def perturbed(settings: EvaluateSettings) -> list[Condition]:
-    """The clean condition and the perturbed ones."""
-    return [Condition(each) for each in (NO_PERTURBATION, *settings.perturbations)]
-
-
-def armed(arms: Sequence[str]) -> list[Condition]:
-    """The conditions of some arms."""
-    return [Condition(arm=arm) for arm in arms]
 
 
 def order(line: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -253,7 +251,8 @@ def _for_workers(player: PolicyPlayer) -> PolicyPlayer:
     threads = max(1, cores() // settings.workers) if isinstance(settings.workers, int) else 1
     folders = [str(Path(folder).resolve()) for folder in settings.folders]
     client = settings.remote and str(Path(settings.remote.file).resolve())
-    changed = replace(settings, pool=folders, client=client, workers=1)
+    fresh = [str(Path(folder).resolve()) for folder in settings.benign]
+    changed = replace(settings, pool=folders, benign=fresh, client=client, workers=1)
     return PolicyPlayer(changed, player.search, player.strict, threads)
 
 

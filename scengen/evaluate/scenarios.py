@@ -24,8 +24,18 @@ def chosen(pools: Sequence[Pool], settings: EvaluateSettings, search: Sequence[s
     Raises:
         BadConfig: a pool holds fewer than requested, or none of them has one of the splits.
     """
+    count = most_scenarios(pools, settings, search)
     some = [_of_splits(pool, settings, search) for pool in pools]
-    counts = {str(pool.folder): len(own) for pool, own in zip(pools, some, strict=True) if own}
+    return {key: told for own in some for key, told in itertools.islice(own.items(), count)}
+
+
+def most_scenarios(pools: Sequence[Pool], settings: EvaluateSettings, search: Sequence[str]) -> int:
+    """Number of scenarios that are played of each pool.
+
+    Raises:
+        BadConfig: a pool holds fewer than requested, or none of them has one of the splits.
+    """
+    counts = {str(pool.folder): n for pool in pools if (n := len(_of_splits(pool, settings, search)))}
     if not counts:
         named = ", ".join(sorted({split for pool in pools for split in pool.kinds("split")[0]}))
         raise BadConfig(f"splits = {settings.splits}; these pools have none of them, but {named}; pass splits=all")
@@ -33,7 +43,7 @@ def chosen(pools: Sequence[Pool], settings: EvaluateSettings, search: Sequence[s
     for folder, there in counts.items():
         if there < count:
             raise BadConfig(f"seeds = {count}, but {folder} holds {there} scenarios; pass seeds={there}")
-    return {key: told for own in some for key, told in itertools.islice(own.items(), count)}
+    return count
 
 
 def different_sizes(pools: Sequence[Pool], settings: EvaluateSettings) -> str:

@@ -68,6 +68,7 @@ class EvaluateSettings:
     perturb_seed: int = 0
     arms: str | list[str] = AUTO
     format: list[str] = field(default_factory=list)
+    benign: list[str] = field(default_factory=list)
 
     @cached_property
     def folders(self) -> list[str]:
@@ -89,6 +90,11 @@ class EvaluateSettings:
             return None
         given = self.arms.split(",") if isinstance(self.arms, str) else self.arms
         return [] if given in ([NONE], [""]) else list(dict.fromkeys(given))
+
+    @property
+    def every_folder(self) -> list[str]:
+        """Folders of the pools, and of those of the arm `benign`, which `benign.benign_pools` makes."""
+        return [*self.folders, *self.benign]
 
     @property
     def name(self) -> str:

@@ -8,6 +8,8 @@ from rich.table import Table
 
 from ...compose import load_task
 from ...demos.rollouts import Keeper
+from ...evaluate.arms import BENIGN
+from ...evaluate.benign import benign_pools
 from ...evaluate.comparison import MAX_SHOWN, Comparison, PolicyResult
 from ...evaluate.edition import Edition, check_pool, chosen_sets, evaluation_pools
 from ...evaluate.policies import find_policy
@@ -31,6 +33,9 @@ def command(arguments: Arguments) -> int:
     if settings.edition:
         folders = _edition_pools(settings, settings.edition)
         settings = replace(settings, pool=folders)
+        every = settings.several()
+    if BENIGN in (settings.chosen_arms or ()):
+        settings = replace(settings, benign=_benign_pools(settings, search_path(arguments)))
         every = settings.several()
     if told := different_sizes([*map(Pool.open, settings.folders)], settings):
         remark(told)
@@ -72,6 +77,14 @@ def _edition_pools(settings: EvaluateSettings, edition: str) -> list[str]:
     with ProgressBar(err, f"edition {found.name}", found.n, settings.workers) as progress_bar:
         return evaluation_pools(
             found, keys, settings.workers, lambda key, done, total: progress_bar.of(done, total, f"certify {key}")
+        )
+
+
+def _benign_pools(settings: EvaluateSettings, search: Sequence[str]) -> list[str]:
+    """The pools of the arm `benign`."""
+    with ProgressBar(err, "benign", 1, settings.workers) as progress_bar:
+        return benign_pools(
+            settings, search, lambda task, done, total: progress_bar.of(done, total, f"certify {task}, fresh draws")
         )
 
 
