@@ -7,6 +7,7 @@ import pytest
 from helpers import REFERENCE
 
 from scengen import cli
+from scengen.evaluate import benign
 from scengen.evaluate.arms import seen_by, wrong_instruction
 from scengen.evaluate.comparison import Comparison, PolicyResult
 from scengen.evaluate.conditions import condition_lines, factors, interactions
@@ -150,3 +151,12 @@ def test_arms_without_texts_or_a_name_are_refused(tmp_path, capsys):
     assert cli.run([*words, "arms=blnd"]) == 2 and "did you mean 'blind'" in capsys.readouterr().err
     assert cli.run([*words, "arms=reworded", "action_repeat=100"]) == 2
     assert "domino_single has no conf/language/domino_single.yaml" in capsys.readouterr().err
+
+
+def test_fresh_training_scenarios_are_an_arm_that_is_verified_too(tmp_path, capsys):
+    words = ("evaluate", "policy=idle", f"pool={REFERENCE}", "seeds=1", "rollouts=1", f"to={tmp_path}", "arms=benign")
+    assert cli.run([*words, "action_repeat=100"]) == 0
+    clean, fresh = read_lines(tmp_path / "episodes.jsonl")
+    assert (clean["arm"], fresh["arm"], fresh["seed"], fresh["split"]) == ("clean", "benign", benign.SEED, "id")
+    assert "fresh training scenarios 0 of 1, clean 0 of 1" in capsys.readouterr().out
+    assert cli.run(["verify", f"results={tmp_path}", "level=full"]) == 0
