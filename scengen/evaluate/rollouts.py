@@ -117,6 +117,8 @@ class _Run:
 
     def play(self, some: set[RolloutId]) -> None:
         """Play those rollouts that the log does not hold."""
+        if not some:
+            return
         self.wanted |= some
         todo = sorted(some - set(map(id_of, self.log.records)))  # one task and perturbation after the other
         done = len(some) - len(todo)
