@@ -43,6 +43,7 @@ def test_the_oracle_is_filtered_once(tmp_path, action_filter):
 
 def test_a_goal_has_to_last_as_in_a_certificate(tmp_path, monkeypatch):
     monkeypatch.setattr(DominoSingle, "success", lambda self, world: 0.2 < world.time < 0.7)
+    monkeypatch.setattr(DominoSingle, "means", lambda self: {})
     (episode,) = run(tmp_path, "idle", seeds=1)
     assert not episode["success"] and "did not last" in episode["reason"]
     (episode,) = run(tmp_path / "at once", "idle", seeds=1, settle=False)
@@ -91,14 +92,14 @@ def test_a_run_cut_short_goes_on_where_it_was(tmp_path):
 def test_results_name_the_versions_of_their_tasks_and_versions_are_not_mixed(tmp_path, monkeypatch):
     argv = ["evaluate", "policy=idle", f"pool={REFERENCE}", "seeds=1", "rollouts=1", f"to={tmp_path}"]
     assert cli.run(argv) == 0
-    monkeypatch.setattr(DominoSingle, "VERSION", 2)
-    assert cli.run(argv) == 2, "episodes of version 1 are not continued"
+    monkeypatch.setattr(DominoSingle, "VERSION", newer := DominoSingle.VERSION + 1)
+    assert cli.run(argv) == 2, "episodes of the version before are not continued"
     assert cli.run([*argv, "fresh=true"]) == 0
     identity = json.loads((tmp_path / "run.json").read_text())
     record = json.loads((tmp_path / "episodes.jsonl").read_text())
-    assert identity["task_versions"] == {"domino_single": 2} and record["task_version"] == 2
-    assert json.loads((tmp_path / "table.json").read_text())["task_versions"] == {"domino_single": 2}
-    assert "Versions of the tasks: domino_single 2." in (tmp_path / "table.md").read_text()
+    assert identity["task_versions"] == {"domino_single": newer} and record["task_version"] == newer
+    assert json.loads((tmp_path / "table.json").read_text())["task_versions"] == {"domino_single": newer}
+    assert f"Versions of the tasks: domino_single {newer}." in (tmp_path / "table.md").read_text()
 
 
 def test_the_table_pairs_each_split_with_training(tmp_path):
