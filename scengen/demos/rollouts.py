@@ -9,6 +9,7 @@ from typing import Self
 
 from ..episode import Actions, check_rules
 from ..errors import BadConfig
+from ..evaluate.lines import FOLDER, kept_folder
 from ..evaluate.settings import EvaluateSettings, RolloutId
 from ..pool import Pool
 from ..pool.demonstrations import DEMONSTRATIONS, POLICY, DemonstrationConfig
@@ -22,9 +23,6 @@ from ..validate.playable import stored_world
 from ..validate.rollout import replay
 from ..validate.verify.stored import task_of_manifest
 from .generate import FAILED, KEPT, DemosSummary, finish
-
-FOLDER = "rollouts"
-"""Folder of the kept rollouts, below that of the evaluation."""
 
 
 class Keeper:
@@ -41,11 +39,13 @@ class Keeper:
         names = [Path(folder).name for folder in settings.folders]
         if twice := {name for name in names if names.count(name) > 1}:
             raise BadConfig(f"several pools are in folders named {twice.pop()}; rename one to keep their episodes")
-        self._pools: dict[str, _PoolKeeper] = {}
-        for folder, name in zip(settings.folders, names, strict=True):
-            pool = Pool.open(folder)
-            task = task_of_manifest(pool, tasks[pool.task])
-            self._pools[str(pool.folder)] = _PoolKeeper(pool, task, settings, settings.folder / FOLDER / name)
+        self.settings = settings
+        self._pools = {str(pool.folder): pool for pool in map(Pool.open, settings.every_folder)}
+        self._tasks = {name: task_of_manifest(pool, tasks[pool.task]) for name, pool in self._pools.items()}
+        self._kept: dict[Path, _PoolKeeper] = {}
+        for folder, pool in self._pools.items():
+            for earlier in sorted(settings.folder.glob(f"{FOLDER}*/{pool.folder.name}")):
+                self._keeper(folder, earlier)
 
     def __call__(self, which: RolloutId, actions: Actions) -> None:
         """Keep the actions of a rollout.
@@ -53,15 +53,21 @@ class Keeper:
         Raises:
             ScengenError: rollouts of another evaluation are there, or nothing can be written.
         """
-        self._pools[which.pool].add(which, actions)
+        self._keeper(which.pool, kept_folder(self.settings.folder, which)).add(which, actions)
+
+    def _keeper(self, pool: str, folder: Path) -> "_PoolKeeper":
+        """The keeper that writes a folder."""
+        if folder not in self._kept:
+            self._kept[folder] = _PoolKeeper(self._pools[pool], self._tasks[pool], self.settings, folder)
+        return self._kept[folder]
 
     def finish(self) -> list[DemosSummary]:
         """Write the folders of all pools, and return what they hold."""
-        return [keeper.finish() for keeper in self._pools.values()]
+        return [keeper.finish() for keeper in self._kept.values()]
 
     def close(self) -> None:
         """Close the journals."""
-        for keeper in self._pools.values():
+        for keeper in self._kept.values():
             keeper.close()
 
     def __enter__(self) -> Self:

@@ -216,6 +216,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._world: World | None = None
         self._renderer: Camera | None = None
         self._row: PoolRow = self._rows[0]
+        self._instruction: str | None = None
+        self.instruction_read = False
+        """Whether `task_description` was read."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles open the pools again and continue from the same state with a separate simulation."""
@@ -234,8 +237,19 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def task_description(self) -> str:
-        """The instruction of the running scenario, as a perturbation words it."""
-        return (self.drawn.instruction if self._world else None) or self._row.instruction
+        """The instruction: that of the running scenario as a perturbation words it, or one that `instruct` gave."""
+        self.instruction_read = True
+        return self.instruction
+
+    @property
+    def instruction(self) -> str:
+        """The same for evaluators: it does not count as read."""
+        given = self.drawn.instruction if self._instruction is None and self._world else self._instruction
+        return self._row.instruction if given is None else given
+
+    def instruct(self, text: str | None) -> None:
+        """Replace the instruction of the running scenario; None restores it."""
+        self._instruction = text
 
     @property
     def horizon(self) -> float:
@@ -317,6 +331,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         with self._lock:
             reward, terminated, truncated, info = self._play(given if self.action_filter else unfiltered(given))
             return self._observe(), reward, terminated, truncated, info
+
+    @property
+    def renderer(self) -> str:
+        """Name of the renderer of the pictures; empty as long as there is none."""
+        return "" if self._renderer is None else self._renderer.device
 
     def render(self) -> Reading | None:  # type: ignore[override]
         """A picture of `camera`, shape (height, width, 3), or None without a render mode."""

@@ -1,19 +1,34 @@
 """Evaluations of one policy or several side by side: the table, the headline, and why episodes fail."""
 
+import json
+import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from ..look.looks import look_named
+from ..perturb.perturbation import NONE
+from ..samplers.split import ID
+from .arms import CLEAN
+from .conditions import ConditionLine, Interaction, arm_sentences, condition_lines, interactions, without_effect
 from .edition import Edition
+from .latex import FILE, latex
+from .lines import CSV, as_csv
 from .rollouts import Evaluation
-from .settings import EvaluateSettings
-from .table import TableLine, cells, otherwise, plain, table
+from .rows import Row, rows, shown
+from .settings import LATEX, EvaluateSettings
+from .statistics import smallest_visible_drop
+from .table import TableLine, distinct, otherwise, plain, table
 
-COUNTS = ("crashed", "otherwise")
-"""Counts of the lines of a table, each shown if any is above 0."""
+TABLE = "table.json"
+"""File with the figures of an evaluation."""
+MARKDOWN = "table.md"
+"""File with the same tables for people."""
+LOCAL = ("workers", "slots", "to", "fresh", "client")
+"""Settings on which no figure depends."""
 MAX_SHOWN = 20
 """Largest number of reasons in a printed list."""
 
@@ -63,8 +78,56 @@ class PolicyResult:
 
     @cached_property
     def lines(self) -> list[TableLine]:
-        """The lines of its table."""
-        return table(self.evaluation.episodes)
+        """The lines of its table, without means that repeat another line."""
+        return distinct(self._every_line, {e["task"]: e["category"] for e in self.clean})
+
+    @cached_property
+    def _every_line(self) -> list[TableLine]:
+        return table(self.clean)
+
+    @cached_property
+    def conditions(self) -> list[ConditionLine]:
+        """Its success under each condition."""
+        return condition_lines(self.evaluation.episodes)
+
+    @cached_property
+    def interactions(self) -> list[Interaction]:
+        """Interactions of axes and perturbations."""
+        return interactions(self.evaluation.episodes)
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """The rows of its table."""
+        return [*rows(self.settings.name, self.lines, self.conditions, self.clean)]
+
+    @property
+    def sentences(self) -> Iterator[str]:
+        """Sentences about its table: the drop, what is used, interactions, the means, what so few could not show."""
+        yield self.headline
+        before = {(row.task, row.split): row.rate for row in self.rows if not row.condition}
+        same = without_effect(self.conditions)
+        unchanged = [f"{task}: no action changes under {', '.join(names)}" for task, names in same.items()]
+        together = [one for one in self.interactions if not {one.one, one.other} & {*same.get(one.task, ())}]
+        arms = arm_sentences(self.conditions, before)
+        for told in (*arms, *unchanged, *together, self.by_means, self._visible):
+            yield f"{self.settings.name}: {told}" if told else ""
+
+    @property
+    def _visible(self) -> str:
+        """The smallest drop that this number of scenarios can show."""
+        first = next((row.rate for row in self.rows if row.split == ID), None)
+        if first is None or not any(row.change for row in self.rows):
+            return ""
+        least = smallest_visible_drop(first.value, first.scenarios)
+        what = f"{first.scenarios} scenarios show drops of"
+        return (
+            f"{what} {100 * least:.0f} points or more" if least else f"{first.scenarios} scenarios show no drop at all"
+        )
+
+    @cached_property
+    def clean(self) -> list[dict[str, Any]]:
+        """Episodes without a perturbation and without an intervention."""
+        return [e for e in self.evaluation.episodes if (e["perturbation"], e["arm"]) == (NONE, CLEAN)]
 
     @property
     def task_versions(self) -> dict[str, int]:
@@ -76,7 +139,7 @@ class PolicyResult:
         """Its failures, the most frequent first."""
         found = Counter(
             (e["task"], e["split"], f"crashed: {e['crashed']}" if e.get("crashed") else e["reason"], e.get("phase", ""))
-            for e in self.evaluation.episodes
+            for e in self.clean
             if not e["success"]
         )
         return [Failure(self.settings.name, *about, count) for about, count in found.most_common()]
@@ -84,21 +147,21 @@ class PolicyResult:
     @cached_property
     def ways(self) -> list[Way]:
         """Its episodes that reached the goal without all means of their tasks, the most frequent first."""
-        found = Counter((e["task"], e["split"], e["lacks"]) for e in self.evaluation.episodes if otherwise(e))
+        found = Counter((e["task"], e["split"], e["lacks"]) for e in self.clean if otherwise(e))
         return [Way(self.settings.name, *about, count) for about, count in found.most_common()]
 
     @property
     def by_means(self) -> str:
         """How many episodes reached the goal by the means of their tasks; empty if all did."""
-        reached = [e for e in self.evaluation.episodes if e["success"] or otherwise(e)]
-        ways, every = sum(map(otherwise, reached)), len(self.evaluation.episodes)
+        reached = [e for e in self.clean if e["success"] or otherwise(e)]
+        ways, every = sum(map(otherwise, reached)), len(self.clean)
         said = f"the goal was reached in {len(reached)} of {every} episodes, in {len(reached) - ways} by the means"
-        return f"{self.settings.name}: {said}" if ways else ""
+        return said if ways else ""
 
     @property
     def headline(self) -> str:
         """The drop of all tasks together; empty without two sides."""
-        drop = self.lines[-1].difference
+        drop = self._every_line[-1].difference
         if drop is None:
             return ""
         low, high = 100 * drop.low, 100 * drop.high
@@ -118,12 +181,16 @@ class PolicyResult:
             "splits": settings.splits,
             "task_versions": self.task_versions,
             "edition": settings.edition and edition_told(settings.edition),
-            "settle": settings.settle,
+            "settings": {name: value for name, value in asdict(settings).items() if name not in LOCAL},
+            "episodes_sha256": self.evaluation.chain,
+            "lost": dict(self.evaluation.lost),
+            "arms": list(self.evaluation.arms),
+            "benign": dict(self.evaluation.benign),
             "look": str(look_named(settings.look)),
-            "perturb": settings.perturb,
-            "perturb_seed": settings.perturb_seed,
             "headline": self.headline,
             "table": plain(self.lines),
+            "conditions": [asdict(line) for line in self.conditions],
+            "interactions": [{**asdict(each), "told": str(each)} for each in self.interactions],
             "failures": [asdict(failure) for failure in self.failures],
             "otherwise": [asdict(way) for way in self.ways],
         }
@@ -136,23 +203,13 @@ class Comparison:
     results: Sequence[PolicyResult]
     """Result of each policy."""
 
-    @property
-    def head(self) -> list[str]:
-        """Titles of the columns."""
-        counts = [name for name in COUNTS if self._any(name)]
-        return ["", "split", *self._if_several("policy"), "ID", "OOD", "difference", *counts]
+    def table(self, digits: int = 0) -> tuple[list[str], list[list[str]], Mapping[str, str]]:
+        """The table: titles of the columns, rows of all policies, and what all rows have in common.
 
-    def rows(self) -> Iterator[list[str]]:
-        """The cells of the table: for each task and split, and each category, a row for each policy."""
-        order = dict.fromkeys((line.what, line.split) for result in self.results for line in result.lines)
-        tables = [{(line.what, line.split): line for line in result.lines} for result in self.results]
-        sections = [key for key in order if key != ("all", "all")] + [("all", "all")]
-        for key in sections:
-            for result, lines in zip(self.results, tables, strict=True):
-                if key in lines:
-                    what, split, *rates = cells(lines[key])
-                    counts = [str(getattr(lines[key], name)) for name in COUNTS if self._any(name)]
-                    yield [what, split, *self._if_several(result.settings.name), *rates, *counts]
+        Args:
+            digits: number of digits after the point.
+        """
+        return shown([row.cells(digits) for row in self.rows])
 
     @property
     def failure_head(self) -> list[str]:
@@ -177,15 +234,37 @@ class Comparison:
 
     @property
     def headlines(self) -> list[str]:
-        """The drop of each policy that has both sides, and how many of its successes were by the means."""
-        return [line for result in self.results for line in (result.headline, result.by_means) if line]
+        """Sentences about the tables of the policies."""
+        return [line for result in self.results for line in result.sentences if line]
+
+    def plain(self, folder: Path) -> Mapping[str, Any]:
+        """The comparison as plain data; that of one policy alone is its result.
+
+        Args:
+            folder: folder of the comparison.
+        """
+        told = [{"folder": os.path.relpath(r.settings.folder, folder), **r.plain} for r in self.results]
+        return told[0] if len(told) == 1 else {"policies": told}
+
+    def files(self, folder: Path) -> dict[Path, str]:
+        """Content of the files of the comparison: tables, and the lines of each policy without JSON."""
+        lines = {result.settings.folder / CSV: as_csv(result.evaluation.episodes) for result in self.results}
+        told = json.dumps(self.plain(folder), indent=1, allow_nan=False) + "\n"
+        in_latex = LATEX in self.results[0].settings.format
+        more = {folder / FILE: latex(self.rows, self.category)} if in_latex else {}
+        return {**lines, folder / TABLE: told, folder / MARKDOWN: self.markdown, **more}
 
     @property
-    def plain(self) -> Mapping[str, Any]:
-        """The comparison as plain data; that of one policy alone is its result."""
-        if len(self.results) == 1:
-            return self.results[0].plain
-        return {"policies": [result.plain for result in self.results]}
+    def category(self) -> dict[str, str]:
+        """Category of each task."""
+        return {e["task"]: e["category"] for result in self.results for e in result.clean}
+
+    @property
+    def rows(self) -> list[Row]:
+        """The rows of all policies, those about the same episodes next to each other."""
+        every = [row for result in self.results for row in result.rows]
+        order = list(dict.fromkeys((row.task, row.split, row.condition) for row in every))
+        return sorted(every, key=lambda row: order.index((row.task, row.split, row.condition)))
 
     @property
     def markdown(self) -> str:
@@ -193,16 +272,13 @@ class Comparison:
         settings = self.results[0].settings
         names = ", ".join(f"`{result.settings.name}`" for result in self.results)
         settling = "" if settings.settle else ", goals counted at once"
-        head = (
-            f"{names}: success in percent [95 % interval], {settings.seeds} scenarios a pool, "
-            f"{settings.rollouts} rollouts each, {settings.rules} rules{settling}"
-        )
-        if settings.perturb:
-            head += f", perturbed by {settings.perturb} (seed {settings.perturb_seed})"
+        head = f"{names}: success in percent [95 % interval], n scenarios x rollouts, {settings.rules} rules{settling}"
         if settings.edition:
             edition = edition_told(settings.edition)
             head += f", edition {edition['name']} (sha256 {edition['sha256'][:12]})"
-        parts = [head, _table(self.head, self.rows())]
+        titles, cells, common = self.table(1)
+        head += "".join(f", {name} {value}" for name, value in common.items() if name == "task")
+        parts = [head, _table(titles, cells)]
         if self.headlines:
             parts.append("\n".join(f"* {_escaped(line)}" for line in self.headlines))
         if rows := list(self.way_rows()):
@@ -216,10 +292,6 @@ class Comparison:
     def _if_several(self, cell: str) -> list[str]:
         """A cell of a column that only a comparison of several policies has."""
         return [cell] if len(self.results) > 1 else []
-
-    def _any(self, name: str) -> bool:
-        """Whether a count of the table is above 0 in any result."""
-        return any(getattr(result.lines[-1], name) for result in self.results)
 
 
 def edition_told(name: str) -> dict[str, str]:

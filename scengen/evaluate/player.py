@@ -1,7 +1,7 @@
 """Rollouts of a policy: as many at once as there are slots, one batch after the other."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any, TypeVar
 
@@ -14,12 +14,16 @@ from ..envs.gym import INFOS, Observation, PoolEnv, checked
 from ..envs.vector import PoolVectorEnv
 from ..episode import check_rules
 from ..errors import ForeignCode, ScengenError
+from ..perturb.perturbation import NONE
 from ..pool import Pool
+from ..pool.files import sha256
 from ..pool.library import Library
 from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..sim.arm import ROBOT
 from ..sim.world import World
+from .arms import CLEAN, instruction, seen_by
+from .lines import picture_digest, state_digest
 from .policies import REPLAY, Policy, find_policy, identity, make_policy, policy_errors
 from .remote.policy import RemotePolicy
 from .settings import EvaluateSettings, RolloutId
@@ -63,10 +67,10 @@ class PolicyPlayer:
             threads: number of threads that step the slots; None for the available cores.
         """
         self.settings, self.search, self.strict, self.threads = settings, search, strict, threads
-        self._running: tuple[str, PoolVectorEnv, list[Policy]] | None = None
+        self._running: tuple[tuple[str, str], PoolVectorEnv, list[Policy]] | None = None
 
     def __call__(self, batch: Sequence[RolloutId]) -> list[dict[str, Any]]:
-        """Play rollouts of one task, from reset to their ends, or until their policies crash.
+        """Play rollouts of one task and condition, from reset to their ends, or until their policies crash.
 
         Returns:
             The records, each with the actions that the controller received as `played` if episodes are kept.
@@ -75,8 +79,10 @@ class PolicyPlayer:
             BadPolicy: a policy returned an invalid action.
             ForeignCode: a policy crashed in the first batch.
         """
-        envs, policies = self._prepared_for(batch[0].task)
+        envs, policies = self._prepared_for(batch[0].task, batch[0].perturbation)
         rollouts = [_Rollout(*each) for each in zip(batch, envs.envs, policies, strict=False)]
+        for rollout in rollouts:
+            rollout.instruct(self.search)
         self._play(envs, rollouts)
         self.strict = False
         return [rollout.record for rollout in rollouts]
@@ -88,11 +94,13 @@ class PolicyPlayer:
         seen, infos = envs.reset(options={"scenario": names, "reset_mask": np.arange(count) < len(rollouts)})
         for slot, rollout in enumerate(rollouts):
             info = {name: infos[name].tolist()[slot] for name in INFOS}
-            begin = partial(rollout.policy.reset, _of_slot(seen, slot), info, rollout.seed)
+            first = rollout.begin(_of_slot(seen, slot))
+            begin = partial(rollout.policy.reset, first, info, rollout.seed)
             self._tried([rollout], f"its reset {rollout.where}", begin)
         actions = np.zeros((count, size), np.float32)
         while going := {slot: rollout for slot, rollout in enumerate(rollouts) if not rollout.record}:
-            chosen = self._actions([*going.values()], [_of_slot(seen, slot) for slot in going])
+            views = [rollout.sees(_of_slot(seen, slot)) for slot, rollout in going.items()]
+            chosen = self._actions([*going.values()], views)
             for (slot, rollout), action in zip(going.items(), chosen, strict=True):
                 if action is not None:
                     actions[slot] = self._checked(rollout, action, size)
@@ -137,45 +145,36 @@ class PolicyPlayer:
         except ValueError as error:
             raise BadPolicy(f"policy {self.settings.name} {rollout.where}: {error}") from None
 
-    def identities(self, tasks: set[str]) -> dict[str, Any]:
-        """Hashes of the policy by task, see `policies.identity`; of a server its description of itself."""
-        return {task: self._identity(task) for task in sorted(tasks)}
+    def described(self, tasks: set[str]) -> dict[str, dict[str, Any]]:
+        """What the policy is and what it observes, by task: hashes of it, see `policies.identity`, of a server its
+        description of itself; and names of streams and cameras."""
+        told: dict[str, dict[str, Any]] = {"server" if self.settings.remote else "code": {}, "observed": {}}
+        who, observed = told.values()
+        for task in sorted(tasks):
+            envs, policies = self._prepared_for(task, NONE)
+            who[task], names = self._identity(policies[0]), envs.envs[0].observed
+            observed[task] = [*names.streams, *names.cameras]
+        return told
 
-    def _identity(self, task: str) -> Any:
-        _, policies = self._prepared_for(task)
-        if isinstance(policies[0], RemotePolicy):
-            return policies[0].described()
+    def _identity(self, policy: Policy) -> Any:
+        if isinstance(policy, RemotePolicy):
+            return policy.described()
         factory = find_policy(self.settings.name, client=self.settings.remote)
-        return identity(self.settings.name, factory, policies[0])
+        return identity(self.settings.name, factory, policy)
 
-    def _prepared_for(self, task: str) -> tuple[PoolVectorEnv, list[Policy]]:
-        if self._running and self._running[0] != task:
+    def _prepared_for(self, task: str, perturbation: str) -> tuple[PoolVectorEnv, list[Policy]]:
+        if self._running and self._running[0] != (task, perturbation):
             self.close()
         if not self._running:
-            settings, remote = self.settings, self.settings.remote
-            folders = [f for f in settings.folders if task in Pool.open(f).kinds("task")[0]]
+            settings = self.settings
+            remote = settings.remote
             observed = remote.streams(load_task(task, self.search).embodiment) if remote else settings.observations
-            envs = PoolVectorEnv(
-                task,
-                folders,
-                settings.slots,
-                self.threads,
-                AutoresetMode.DISABLED,
-                observations=observed,
-                width=settings.width,
-                height=settings.height,
-                action_filter=settings.action_filter,
-                action_repeat=remote.repeat if remote else settings.action_repeat,
-                rules=check_rules(settings.rules),
-                settle=settings.settle,
-                perturb=settings.perturb,
-                perturb_seed=settings.perturb_seed,
-                look=settings.look,
-                search=self.search,
-            )
-            memory = _training(folders) if settings.name == REPLAY else None
-            factory = find_policy(settings.name, memory, remote)
-            self._running = task, envs, [make_policy(settings.name, factory, env) for env in envs.envs]
+            envs = environments(settings, task, perturbation, observed, self.search, self.threads)
+            own = [folder for folder in folders_of(settings, task) if folder not in settings.benign]
+            memory = _training(own) if settings.name == REPLAY else None
+            factory = find_policy(settings.name, memory, settings.remote)
+            made = [make_policy(settings.name, factory, env) for env in envs.envs]
+            self._running = (task, perturbation), envs, made
         return self._running[1:]
 
     def close(self) -> None:
@@ -190,6 +189,61 @@ class PolicyPlayer:
             self._running = None
 
 
+def folders_of(settings: EvaluateSettings, task: str) -> list[str]:
+    """Folders of the pools of a task."""
+    return [folder for folder in settings.every_folder if task in Pool.open(folder).kinds("task")[0]]
+
+
+def environments(
+    settings: EvaluateSettings,
+    task: str,
+    perturbation: str,
+    observed: Sequence[str] | None,
+    search: Sequence[str] = (),
+    threads: int | None = None,
+) -> PoolVectorEnv:
+    """The environments in which the rollouts of a task are played, one for each slot.
+
+    Args:
+        observed: names of streams and cameras; None for proprioception.
+    """
+    return PoolVectorEnv(
+        task,
+        folders_of(settings, task),
+        settings.slots,
+        threads,
+        AutoresetMode.DISABLED,
+        observations=observed,
+        width=settings.width,
+        height=settings.height,
+        action_filter=settings.action_filter,
+        action_repeat=settings.remote.repeat if settings.remote else settings.action_repeat,
+        rules=check_rules(settings.rules),
+        settle=settings.settle,
+        perturb=perturbation,
+        perturb_seed=settings.perturb_seed,
+        look=settings.look,
+        search=search,
+    )
+
+
+def first_look(env: PoolEnv, seen: Observation) -> dict[str, Any]:
+    """What a line says of the start of an episode, from the state and from what the policy sees."""
+    pictures = {camera: picture_digest(seen[camera]) for camera in env.cameras}
+    return {
+        "instruction": env.instruction,
+        "perturb": env.drawn.plain(),
+        "first_state": state_digest(env.world),
+        "pictures": pictures,
+        "renderer": env.renderer,
+    }
+
+
+def policy_seed(scenario: str, rollout: int) -> int:
+    """Seed of the random numbers of a policy, the same under each condition."""
+    return int(2**31 * unit("rollout", scenario, rollout))
+
+
 @dataclass
 class _Rollout:
     """A rollout in a slot."""
@@ -199,24 +253,41 @@ class _Rollout:
     policy: Policy
     record: dict[str, Any] = field(default_factory=dict)
     """Data that are known only at the end of the episode; empty before."""
+    start: dict[str, Any] = field(default_factory=dict)
+    """What is known of its start, see `first_look`."""
+
+    def instruct(self, search: Sequence[str]) -> None:
+        """Give the instruction of the arm."""
+        rows, arm = self.env._rows, self.which.arm
+        self.env.instruct(instruction(arm, rows[rows.find(self.which.scenario)], search) if arm != CLEAN else None)
+
+    def begin(self, seen: Observation) -> Observation:
+        """Note the start. Returns what the policy sees of the first observation."""
+        view = self.sees(seen)
+        self.start = first_look(self.env, view)
+        return view
+
+    def sees(self, seen: Observation) -> Observation:
+        """What the policy sees of an observation."""
+        return seen_by(self.which.arm, seen, self.env.cameras)
 
     @property
     def seed(self) -> int:
         """Seed of the policy's random numbers."""
-        return int(2**31 * unit("rollout", self.which.scenario, self.which.rollout))
+        return policy_seed(self.which.scenario, self.which.rollout)
 
     @property
     def where(self) -> str:
         """The scenario, for errors."""
         return f"on scenario {self.env.row.name}"
 
-    def end(self, success: bool, reason: str, **more: str) -> None:
+    def end(self, success: bool, reason: str, lacks: str = "", crashed: str = "") -> None:
         """Write its record."""
-        key = {"pool": self.which.pool, "scenario": self.which.scenario, "rollout": self.which.rollout}
-        world = self.env.world
-        told = {"success": success, "reason": reason, "seconds": round(world.time, 3), "phase": phase(world)}
-        drawn = self.env.drawn
-        self.record = {**key, **told, **more, **({"perturb": drawn.plain()} if drawn.values else {})}
+        world, played = self.env.world, self.env.played
+        told = {"success": success, "reason": reason, "lacks": lacks, "crashed": crashed, "phase": phase(world)}
+        ran = {"seconds": round(world.time, 3), "actions": len(played), "actions_sha256": sha256(played.tobytes())}
+        read = {"instruction_read": self.env.instruction_read, "policy_seed": self.seed, "final_state": world.digest}
+        self.record = {**asdict(self.which), **self.start, **told, **ran, **read}
 
 
 def _of_slot(seen: Mapping[str, Any], slot: int) -> Observation:

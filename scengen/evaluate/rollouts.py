@@ -5,26 +5,30 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
-from dataclasses import dataclass, fields, replace
+from contextlib import closing, suppress
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..compose import load_task
 from ..episode import Actions
 from ..errors import BadConfig, PoolError
+from ..installation import versions
 from ..look.looks import look_named
+from ..perturb.perturbation import NONE as NO_PERTURBATION
 from ..pool import Pool, kinds
+from ..pool.files import sha256
 from ..samplers.split import ID
-from ..samplers.task_files import about as about_task
-from ..validate.playable import unplayable
+from ..work.fingerprint import fingerprint
 from ..work.log import Log
 from ..work.machine import cores
 from ..work.parallel import each
 from ..work.targets import refused, try_folder
-from .player import PolicyPlayer
-from .settings import PAPER, EvaluateSettings, RolloutId, completed
+from .arms import ARMS, BENIGN, LANGUAGE, PICTURES
+from .lines import CHAIN, COLUMNS, FORMAT, RUN, chained, renewed, run_sha256
+from .player import PolicyPlayer, policy_seed
+from .scenarios import Scenarios, chosen, not_playable
+from .settings import Condition, EvaluateSettings, RolloutId, completed
 
 Keep = Callable[[RolloutId, Actions], None]
 """Keeps the actions that the controller received in a rollout; called before the rollout counts as played."""
@@ -40,6 +44,12 @@ class Evaluation:
     """Number of episodes that an earlier run of the same command played."""
     lost: Mapping[str, str]
     """Scenarios that were left out because they cannot be played within the limits, with the reasons."""
+    arms: Sequence[str] = ()
+    """Arms that were played in addition to the clean run."""
+    benign: Mapping[str, str] = field(default_factory=dict)
+    """Hashes of the pools of the arm `benign`, by folder."""
+    chain: str = ""
+    """Hash at the end of the file of episodes, see `lines.chained`."""
 
 
 def evaluate(
@@ -66,36 +76,126 @@ def evaluate(
     kinds.check_target(settings.folder, kinds.EPISODES)
     try_folder(settings.folder)
     pools = [Pool.open(folder).check() for folder in settings.folders]
-    about, lost = _scenarios(pools, settings, search)
-    wanted = {RolloutId(a["task"], *key, k) for key, a in about.items() for k in range(settings.rollouts)}
+    fresh = [Pool.open(folder).check() for folder in settings.benign]
+    about = {**chosen(pools, settings, search), **(chosen(fresh, settings, search) if fresh else {})}
+    lost = not_playable([*pools, *fresh], about, settings.workers)
+    if not (about := {key: told for key, told in about.items() if key[1] not in lost}):
+        raise PoolError(f"no scenario can be played; see scengen verify: {'; '.join(lost.values())}")
     path = settings.folder / kinds.EPISODES
     if settings.remote and settings.version is None and not settings.fresh and path.exists():
         why = f"{path} holds episodes of an earlier run, and a server does not say which weights it serves"
         raise BadConfig(f"{why}; pass fresh=true to start again, or version=NAME from the start to be able to continue")
     remedy = "pass fresh=true to start again (old episodes are moved aside), or choose another to="
     with closing(PolicyPlayer(settings, search)) as player:
-        versions = {a["task"]: a["task_version"] for a in about.values()}
-        code = {"server" if settings.remote else "code": player.identities({*versions})}
-        depends = {**_identity(settings, pools), "task_versions": versions, **code}
+        task_versions = {a["task"]: a["task_version"] for a in about.values()}
+        described = player.described({*task_versions})
+        depends = {**_identity(settings, pools), "task_versions": task_versions, **described}
         if settings.fresh:
             _move_aside(path)
-        with Log(path, depends, remedy) as log:
-            todo = sorted(wanted - set(map(_id, log.records)))  # tasks one after the other, see `PolicyPlayer`
-            done = len(wanted) - len(todo)
-            progress(done, len(wanted))
-            player.strict = not done
-            for count, episode in enumerate(_played(player, todo), done + 1):
-                played, task = episode.pop("played", None), about[episode["pool"], episode["scenario"]]["task"]
-                if played is not None:
-                    keep(_id({"task": task, **episode}), played)
-                log.add({"task": task, "task_version": versions[task], **episode})
-                progress(count, len(wanted))
-            records = log.records
-    episodes = sorted(
-        ({**about[e["pool"], e["scenario"]], **e} for e in records if _id(e) in wanted),
-        key=lambda e: (e["task"], e["split"] != ID, e["split"], e["scenario"], e["rollout"]),
-    )
-    return Evaluation(episodes, done, lost)
+        with Log(path, depends, remedy, settings.folder / RUN) as log:
+            run = _Run(settings, player, about, log, keep, progress)
+            run.play(wanted(about, settings))
+            run.play(wanted(about, settings, arms := run.arms()))
+            run.sort()
+            pinned = {str(pool.folder): pool.sha256 for pool in fresh}
+            return Evaluation(run.lines(), run.earlier, lost, arms, pinned, run.chain)
+
+
+@dataclass
+class _Run:
+    """A run whose log is open."""
+
+    settings: EvaluateSettings
+    player: PolicyPlayer
+    about: Scenarios
+    log: Log
+    keep: Keep
+    progress: Callable[[int, int], None]
+    earlier: int = 0
+    """Number of episodes that an earlier run played."""
+    wanted: set[RolloutId] = field(default_factory=set)
+    """All rollouts of the run."""
+
+    def play(self, some: set[RolloutId]) -> None:
+        """Play those rollouts that the log does not hold."""
+        if not some:
+            return
+        self.wanted |= some
+        todo = sorted(some - set(map(id_of, self.log.records)))  # one task and perturbation after the other
+        done = len(some) - len(todo)
+        self.earlier += done
+        self.progress(done, len(some))
+        self.player.strict = not self.log.records
+        for count, record in enumerate(_played(self.player, todo), done + 1):
+            played = record.pop("played", None)
+            if played is not None:
+                self.keep(id_of(record), played)
+            self._add(record)
+            self.progress(count, len(some))
+
+    def lines(self) -> list[dict[str, Any]]:
+        """The lines of all rollouts of the run."""
+        return [line for line in self.log.records if id_of(line) in self.wanted]
+
+    @property
+    def chain(self) -> str:
+        """Hash at the end of the log."""
+        return self.log.records[-1][CHAIN] if self.log.records else run_sha256(self.log.identity)
+
+    def sort(self) -> None:
+        """Bring the lines into an order that does not depend on when they were played."""
+        there = sorted(self.log.records, key=order)
+        if there != self.log.records:
+            self.log.replace(renewed(self.log.identity, there))
+
+    def arms(self) -> list[str]:
+        """The chosen arms; by default those of the inputs that the policy has."""
+        if self.settings.chosen_arms is not None:
+            return self.settings.chosen_arms
+        lines = self.lines()
+        inputs = ((PICTURES, "pictures"), (LANGUAGE, "instruction_read"))
+        has = {what: any(line[name] for line in lines) for what, name in inputs}
+        return [arm.name for arm in ARMS.values() if arm.automatic and has[arm.needs]]
+
+    def _add(self, record: dict[str, Any]) -> None:
+        """Store the line of an episode."""
+        told = told_of(id_of(record), self.about[record["pool"], record["scenario"]])
+        made = {"policy": self.settings.name, "instruction_sha256": sha256(record["instruction"])}
+        line = {"episode": len(self.log.records), **record, **told, **made, **here()}
+        line = {name: line[name] for name in COLUMNS if name != CHAIN}
+        self.log.add({**line, CHAIN: chained(self.chain, line)})
+
+
+@cache
+def here() -> dict[str, Any]:
+    """Versions and fingerprint of this machine."""
+    found = versions()
+    return {"machine": fingerprint(), "scengen": found["scengen"], "mujoco": found["mujoco"]}
+
+
+def wanted(about: Scenarios, settings: EvaluateSettings, arms: Sequence[str] | None = None) -> set[RolloutId]:
+    """Rollouts of some scenarios: clean and perturbed ones, or those of some arms.
+
+    Args:
+        about: folders of pools and ids of scenarios, with what is known of them.
+        arms: names of the arms.
+    """
+    plain = [Condition(each) for each in (NO_PERTURBATION, *settings.perturbations)]
+    usual = plain if arms is None else [Condition(arm=arm) for arm in arms if arm != BENIGN]
+    fresh = [Condition(arm=arm) for arm in arms or () if arm == BENIGN]
+    return {
+        RolloutId(told["task"], each.perturbation, each.arm, *key, k)
+        for key, told in about.items()
+        for each in (fresh if key[0] in settings.benign else usual)
+        for k in range(settings.rollouts)
+    }
+
+
+def order(line: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Key by which lines are sorted: clean episodes first, and those in training before others."""
+    condition = Condition(line["perturbation"], line["arm"])
+    where = line["split"] != ID, line["split"], line["pool"], line["index"], line["scenario"], line["rollout"]
+    return line["task"], bool(condition), condition, *where
 
 
 def _played(player: PolicyPlayer, todo: Sequence[RolloutId]) -> Iterator[dict[str, Any]]:
@@ -109,101 +209,41 @@ def _played(player: PolicyPlayer, todo: Sequence[RolloutId]) -> Iterator[dict[st
         alone.extend([which] for which in batch)
         return []
 
-    of_tasks = [list(group) for _, group in itertools.groupby(todo, lambda which: which.task)]
+    of_tasks = [list(group) for _, group in itertools.groupby(todo, lambda which: (which.task, which.condition))]
     batches = [some[i : i + settings.slots] for some in of_tasks for i in range(0, len(some), settings.slots)]
     for some in (batches, alone):
         for records in each(play, some, settings.workers, lost=lost):
             yield from records
 
 
-def _id(episode: Mapping[str, Any]) -> RolloutId:
-    return RolloutId(**{f.name: episode[f.name] for f in fields(RolloutId)})
+def told_of(which: RolloutId, scenario: Mapping[str, Any]) -> dict[str, Any]:
+    """What the line of a rollout says of its scenario."""
+    words = [which.task, scenario["split"], *([str(which.condition)] if which.condition else [])]
+    return {**scenario, "skill": "/".join(words)}
 
 
-Scenarios = dict[tuple[str, str], dict[str, Any]]
-"""Columns of scenarios that the table needs, by the pool's folder and the scenario's id."""
-
-
-def _scenarios(
-    pools: Sequence[Pool], settings: EvaluateSettings, search: Sequence[str]
-) -> tuple[Scenarios, dict[str, str]]:
-    """The scenarios that can be played, and those that cannot, with the reasons.
-
-    Raises:
-        PoolError: no scenario can be played.
-    """
-    about: Scenarios = {}
-    for pool in pools:
-        about |= _first_scenarios(pool, settings, search)
-    if not about:
-        named = ", ".join(sorted({split for pool in pools for split in pool.kinds("split")[0]}))
-        raise BadConfig(f"splits = {settings.splits}; these pools have none of them, but {named}; pass splits=all")
-    rows = (
-        row
-        for pool in pools
-        for row in itertools.islice(pool.rows(), _last(pool, about))
-        if (str(pool.folder), row.id) in about
-    )
-    if lost := dict(unplayable(rows, settings.workers)):
-        about = {(pool, id_): a for (pool, id_), a in about.items() if id_ not in lost}
-        if not about:
-            raise PoolError(f"no scenario can be played; see scengen verify: {'; '.join(lost.values())}")
-    return about, lost
-
-
-def _first_scenarios(pool: Pool, settings: EvaluateSettings, search: Sequence[str]) -> Scenarios:
-    """The first scenarios of a pool, of the chosen splits.
-
-    Raises:
-        BadConfig: the pool holds fewer.
-    """
-    if not len(pool):
-        raise BadConfig(f"{pool.folder} holds no scenario; choose another pool")
-    names = ("task", "category", "split", "seed", "index")
-    every: list[tuple[str, dict[str, Any]]] = [
-        (id_, dict(zip(names, told, strict=True))) for id_, *told in pool.columns("id", *names)
-    ]
-    versions = {name: load_task(name, search).version for name in {told["task"] for _, told in every}}
-    every = [(id_, {**told, "task_version": versions[told["task"]]}) for id_, told in every]
-    wanted = [(id_, told) for id_, told in every if _is_wanted(told["task"], told["split"], settings.splits, search)]
-    if wanted and len(wanted) < settings.seeds:
-        remedy = f"pass seeds={len(wanted)}"
-        raise BadConfig(f"seeds = {settings.seeds}, but {pool.folder} holds {len(wanted)} scenarios; {remedy}")
-    return {(str(pool.folder), id_): told for id_, told in wanted[: settings.seeds]}
-
-
-def _is_wanted(task: str, split: str, splits: str, search: Sequence[str]) -> bool:
-    """Whether a split belongs to a set of splits."""
-    return splits != PAPER or split == ID or split in _paper_axes(task, tuple(search))
-
-
-@cache
-def _paper_axes(task: str, search: tuple[str, ...]) -> tuple[str, ...]:
-    return about_task(task, search).paper_axes
-
-
-def _last(pool: Pool, about: Scenarios) -> int:
-    """Number of rows of a pool up to the last chosen one."""
-    numbers = [n for n, (id_,) in enumerate(pool.columns("id"), 1) if (str(pool.folder), id_) in about]
-    return max(numbers, default=0)
+def id_of(line: Mapping[str, Any]) -> RolloutId:
+    """The rollout of a line."""
+    return RolloutId(**{f.name: line[f.name] for f in fields(RolloutId)})
 
 
 def _crashed(which: RolloutId, reason: str) -> dict[str, Any]:
     """The record of a rollout whose process died twice."""
-    key = {"pool": which.pool, "scenario": which.scenario, "rollout": which.rollout}
-    return {**key, "success": False, "reason": "", "seconds": 0.0, "phase": "", "crashed": f"the process {reason}"}
+    unknown = dict.fromkeys(("instruction", "first_state", "renderer", "reason", "lacks", "phase"), "")
+    unknown |= {"actions_sha256": "", "final_state": "", "crashed": f"the process {reason}"}
+    nothing = {"perturb": {}, "pictures": {}, "instruction_read": False, "success": False, "seconds": 0.0, "actions": 0}
+    return {**asdict(which), **unknown, **nothing, "policy_seed": policy_seed(which.scenario, which.rollout)}
 
 
 def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, Any]:
-    """Everything on which the outcome of a rollout depends. More seeds or rollouts continue the same run."""
+    """Everything on which the outcome of a rollout depends. More scenarios, rollouts or conditions continue a run."""
     names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "rules")
-    chosen = {**{name: getattr(settings, name) for name in names}, "look": str(look_named(settings.look))}
+    chosen = {"format": FORMAT, **{name: getattr(settings, name) for name in (*names, "perturb_seed")}}
+    chosen["look"] = str(look_named(settings.look))
     if settings.remote:
         chosen["client"] = settings.remote.identity()
     if not settings.settle:
         chosen["settle"] = False
-    if settings.perturb:
-        chosen |= {"perturb": settings.perturb, "perturb_seed": settings.perturb_seed}
     if settings.keep:
         chosen["keep"] = settings.keep
     return {**chosen, "pools": {str(pool.folder): pool.sha256 for pool in pools}}
@@ -215,7 +255,8 @@ def _for_workers(player: PolicyPlayer) -> PolicyPlayer:
     threads = max(1, cores() // settings.workers) if isinstance(settings.workers, int) else 1
     folders = [str(Path(folder).resolve()) for folder in settings.folders]
     client = settings.remote and str(Path(settings.remote.file).resolve())
-    changed = replace(settings, pool=folders, client=client, workers=1)
+    fresh = [str(Path(folder).resolve()) for folder in settings.benign]
+    changed = replace(settings, pool=folders, benign=fresh, client=client, workers=1)
     return PolicyPlayer(changed, player.search, player.strict, threads)
 
 
@@ -223,8 +264,14 @@ def _move_aside(path: Path) -> None:
     """Rename the file of episodes of earlier runs; nothing is deleted."""
     if not path.exists():
         return
-    free = next(p for k in itertools.count(1) if not (p := path.with_name(f"{path.stem}-{k}{path.suffix}")).exists())
+    free = next(k for k in itertools.count(1) if not _numbered(path, k).exists())
     try:
-        path.rename(free)
+        path.rename(_numbered(path, free))
+        with suppress(FileNotFoundError):
+            path.with_name(RUN).rename(_numbered(path.with_name(RUN), free))
     except OSError as error:
         raise refused(path, error) from None
+
+
+def _numbered(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}-{number}{path.suffix}")

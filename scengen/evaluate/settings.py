@@ -13,11 +13,13 @@ from ..episode import STRICT, check_rules
 from ..errors import BadConfig, UnknownName, cut
 from ..learn.store import is_policy, read_settings
 from ..look.looks import ROOM, look_named
+from ..perturb.perturbation import NONE as NO_PERTURBATION
 from ..perturb.perturbation import Perturbation
 from ..pool import collection
 from ..work.foreign import is_factory
 from ..work.limits import at_least
 from ..work.parallel import Workers
+from .arms import AUTO, CLEAN, NONE, check_arms
 from .policies import FULL_RATE_POLICIES
 from .remote.client import INSTRUCTION, ClientSettings, address_of, is_address, read_client
 
@@ -25,10 +27,16 @@ ALL = "all"
 """Name of all splits of the pools."""
 PAPER = "paper"
 """Name of the training split and the OOD conditions of the paper (App. I)."""
+LATEX = "latex"
+"""Value of `format` for tables in LaTeX."""
+PROFILE = "profile"
+"""Value of `format` for plots of the profile of each policy."""
 EPISODES = "episodes"
 """Value of `keep` for keeping the actions of all episodes."""
 SPLITS = (ALL, PAPER)
 """Names of sets of splits."""
+SCENARIOS = 20
+"""Number of scenarios of each pool by default, as in the paper; all of the smallest pool if it holds fewer."""
 MAX_FOLDER_NAME = 100
 """Largest length of the name of a folder that is made from the names of policies."""
 
@@ -41,7 +49,7 @@ class EvaluateSettings:
     pool: str | list[str] | None = None
     edition: str | None = None
     tasks: str | list[str] | None = None
-    seeds: int = 20
+    seeds: int | None = None
     rollouts: int = 5
     observations: list[str] | None = None
     width: int = 256
@@ -58,9 +66,12 @@ class EvaluateSettings:
     splits: str = ALL
     settle: bool = True
     keep: list[str] = field(default_factory=list)
-    perturb: str | None = None
+    perturb: str | list[str] | None = None
     perturb_seed: int = 0
     look: str = ROOM.name
+    arms: str | list[str] = AUTO
+    format: list[str] = field(default_factory=list)
+    benign: list[str] = field(default_factory=list)
 
     @cached_property
     def folders(self) -> list[str]:
@@ -68,6 +79,25 @@ class EvaluateSettings:
         if self.pool is None:
             raise BadConfig("no pool was given; pass pool=FOLDER, or edition=NAME, whose pools scengen evaluate makes")
         return collection.folders(self.pool)
+
+    @cached_property
+    def perturbations(self) -> list[str]:
+        """Perturbations that are played in addition to the clean run, each once."""
+        given = self.perturb.split(",") if isinstance(self.perturb, str) else self.perturb or ()
+        return list(dict.fromkeys(str(p) for p in map(Perturbation.parse, given) if p))
+
+    @property
+    def chosen_arms(self) -> list[str] | None:
+        """Arms that are played in addition to the clean run; None if the inputs of the policy decide."""
+        if self.arms == AUTO:
+            return None
+        given = self.arms.split(",") if isinstance(self.arms, str) else self.arms
+        return [] if given in ([NONE], [""]) else list(dict.fromkeys(given))
+
+    @property
+    def every_folder(self) -> list[str]:
+        """Folders of the pools, and of those of the arm `benign`, which `benign.benign_pools` makes."""
+        return [*self.folders, *self.benign]
 
     @property
     def name(self) -> str:
@@ -134,10 +164,13 @@ class EvaluateSettings:
         """Raise `ScengenError` if a setting is not valid."""
         check_filter(self.action_filter)
         check_rules(self.rules)
-        if Perturbation.parse(self.perturb).has_words and not self._gets_text:
-            raise BadConfig(
-                f"perturb = {self.perturb}; policy {self.name} gets no text: leave out what changes the text"
-            )
+        check_arms(self.chosen_arms or ())
+        self.perturbations  # noqa: B018  (it raises an error)
+        for name in self.format:
+            if name not in (LATEX, PROFILE):
+                raise UnknownName("format", name, (LATEX, PROFILE))
+        if not self._gets_text and (texts := [p for p in self.perturbations if Perturbation.parse(p).has_words]):
+            raise BadConfig(f"perturb = {texts[0]}; policy {self.name} gets no text: leave out what changes the text")
         look_named(self.look)
         if self.splits not in SPLITS:
             raise UnknownName("splits", self.splits, SPLITS)
@@ -159,13 +192,36 @@ class EvaluateSettings:
 
 
 @dataclass(frozen=True, order=True)
+class Condition:
+    """What is changed in an episode without another scenario."""
+
+    perturbation: str = NO_PERTURBATION
+    """Kinds of perturbation at their levels."""
+    arm: str = CLEAN
+    """Name of the arm."""
+
+    def __str__(self) -> str:
+        return "/".join(each for each in (self.perturbation, self.arm) if each not in (NO_PERTURBATION, CLEAN))
+
+    def __bool__(self) -> bool:
+        return self != Condition()
+
+
+@dataclass(frozen=True, order=True)
 class RolloutId:
-    """The identity of a rollout: number `rollout` of a scenario."""
+    """The identity of a rollout: number `rollout` of a scenario under a condition."""
 
     task: str
+    perturbation: str
+    arm: str
     pool: str
     scenario: str
     rollout: int
+
+    @property
+    def condition(self) -> Condition:
+        """What is changed."""
+        return Condition(self.perturbation, self.arm)
 
 
 def completed(settings: EvaluateSettings) -> EvaluateSettings:

@@ -107,34 +107,80 @@ def _cached_uniforms(n: int) -> NDArray[np.float64]:
 
 def difference(a: Rate, b: Rate) -> Difference:
     """`a` minus `b`, for two independent sets of scenarios: Newcombe's hybrid of their intervals."""
-    return Difference(*_difference_interval(a, b, 0.0))
+    return Difference(*_contrast_interval([a, b], (1, -1), np.eye(2)))
+
+
+def smallest_visible_drop(before: float, scenarios: int) -> float | None:
+    """Smallest observed drop whose 95 % interval excludes 0, if all rollouts of a scenario end alike and twins are
+    unrelated; None if not even a drop to 0 does.
+
+    Args:
+        before: success rate before the drop.
+    """
+    solved = round(before * scenarios)
+    before_drop = rate([[k < solved] for k in range(scenarios)])
+
+    def is_seen(drop: int) -> bool:
+        return difference(rate([[k < solved - drop] for k in range(scenarios)]), before_drop).high < 0
+
+    if not solved or not is_seen(solved):
+        return None
+    low, high = 0, solved
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if is_seen(middle) else (middle, high)
+    return high / scenarios
 
 
 def paired(a: Sequence[Sequence[bool]], b: Sequence[Sequence[bool]], confidence: float = CONFIDENCE) -> Difference:
-    """`a` minus `b` over twins: scenario i of both sides is the same except for the parameters that the axis moves.
+    """`a` minus `b` over twins: scenario i of both sides is the same except for the parameters that the axis moves."""
+    return contrast([a, b], (1, -1), confidence)
 
-    The hybrid of their intervals with the correlation of their shares (Zou and Donner 2008). If one side always ends
-    alike, the correlation cannot be estimated and is taken as 0, as for unpaired scenarios.
+
+def contrast(
+    sides: Sequence[Sequence[Sequence[bool]]], signs: Sequence[int], confidence: float = CONFIDENCE
+) -> Difference:
+    """A sum of success rates with signs, over twins: scenario i is the same one on all sides but for what is examined.
+
+    The hybrid of their intervals with the correlations of their shares (Zou and Donner 2008). If a side always ends
+    alike, its correlations cannot be estimated and are taken as 0, as for unpaired scenarios.
+
+    Args:
+        sides: outcomes of the rollouts of every scenario, on each side.
+        signs: 1 or -1 for each side.
     """
-    one, other = (np.array([np.mean(s) for s in side]) for side in (a, b))
-    if len(one) != len(other):
-        raise ValueError(f"{len(one)} and {len(other)} scenarios; twins need the same number on both sides")
-    spread = one.std() * other.std()
-    correlation = float(((one - one.mean()) * (other - other.mean())).mean() / spread) if spread > 0 else 0.0
-    return Difference(*_difference_interval(rate(a, confidence), rate(b, confidence), correlation), len(one))
+    if len({len(side) for side in sides}) > 1:
+        counts = " and ".join(str(len(side)) for side in sides)
+        raise ValueError(f"{counts} scenarios; twins need the same number on all sides")
+    shares = np.array([[np.mean(outcomes) for outcomes in side] for side in sides])
+    return Difference(*_contrast_interval([rate(s, confidence) for s in sides], signs, _related(shares)), len(sides[0]))
 
 
-def _difference_interval(a: Rate, b: Rate, correlation: float) -> tuple[float, float, float]:
-    """Value and interval of a - b by the method of variance estimates recovery."""
-    value = a.value - b.value
-    down = _hypot(a.value - a.low, b.high - b.value, correlation)
-    up = _hypot(a.high - a.value, b.value - b.low, correlation)
-    return value, max(-1.0, value - down), min(1.0, value + up)
+def _related(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Correlations of the shares of several sides; 0 for a side whose shares are all equal."""
+    centred = shares - shares.mean(axis=1, keepdims=True)
+    spread = np.sqrt((centred**2).mean(axis=1))
+    scaled = np.divide(centred, spread[:, None], out=np.zeros_like(centred), where=spread[:, None] > 0)
+    found = scaled @ scaled.T / shares.shape[1]
+    np.fill_diagonal(found, 1.0)
+    return found
 
 
-def _hypot(a: float, b: float, correlation: float) -> float:
-    """Length of the hypotenuse of two correlated half widths."""
-    return float(np.sqrt(max(0.0, a**2 + b**2 - 2 * correlation * a * b)))
+def _contrast_interval(
+    rates: Sequence[Rate], signs: Sequence[int], related: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Value and interval of a sum of rates with signs by the method of variance estimates recovery."""
+    sign, values = np.array(signs, float), np.array([each.value for each in rates])
+    below = values - np.array([each.low for each in rates])
+    above = np.array([each.high for each in rates]) - values
+    value, least, most = float(sign @ values), -float((sign < 0).sum()), float((sign > 0).sum())
+    down, up = np.where(sign > 0, below, -above), np.where(sign > 0, above, -below)
+    return value, max(least, value - _length(down, related)), min(most, value + _length(up, related))
+
+
+def _length(parts: NDArray[np.float64], related: NDArray[np.float64]) -> float:
+    """Length of the sum of correlated half widths."""
+    return float(np.sqrt(max(0.0, parts @ related @ parts)))
 
 
 def mean_rate(rates: Sequence[Rate]) -> Rate:

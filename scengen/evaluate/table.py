@@ -133,8 +133,31 @@ def _values(episodes: Sequence[Mapping[str, Any]], name: str) -> list[str]:
     return list(dict.fromkeys(e[name] for e in episodes))
 
 
-def percent(rate: Rate | Difference | None, sign: str = "") -> str:
+def percent(rate: Rate | Difference | None, sign: str = "", digits: int = 1) -> str:
     """A rate with its interval in percent, as text."""
     if rate is None:
         return "-"
-    return f"{100 * rate.value:{sign}.1f} [{100 * rate.low:{sign}.1f}, {100 * rate.high:{sign}.1f}]"
+    value, low, high = (f"{100 * each:{sign}.{digits}f}" for each in (rate.value, rate.low, rate.high))
+    return f"{value} [{low}, {high}]"
+
+
+def distinct(lines: Sequence[TableLine], category: Mapping[str, str]) -> list[TableLine]:
+    """Lines without those that repeat another one: means over one task, or over one category.
+
+    Args:
+        category: category of each task.
+    """
+    found = [line for line in lines if line.what in category]
+    for line in (line for line in lines if line.what not in category):
+        if not any(_repeats(line, other) for other in found):
+            found.append(line)
+    return found
+
+
+def _repeats(line: TableLine, other: TableLine) -> bool:
+    """Whether a mean has the rates of another line, as that of one task has."""
+
+    def numbers(rate: Rate | None) -> tuple[float, ...]:
+        return () if rate is None else (rate.scenarios, rate.rollouts, round(rate.value, 9))
+
+    return (numbers(line.id), numbers(line.ood)) == (numbers(other.id), numbers(other.ood))

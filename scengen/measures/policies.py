@@ -125,7 +125,7 @@ class _OfPolicies(Measurement):
         """Evaluate a policy once on each scenario of some pools. Returns the episodes by split."""
         pooled = ",".join(map(str, pools.values()))
         self.finish("evaluate", f"policy={policy}", f"pool={pooled}", f"seeds={SCENARIOS}", "rollouts=1", f"to={to}")
-        every = [json.loads(line) for line in (to / "episodes.jsonl").read_text().splitlines()[1:]]
+        every = [json.loads(line) for line in (to / "episodes.jsonl").read_text().splitlines()]
         return {split: [one for one in every if one["pool"] == str(pool)] for split, pool in pools.items()}
 
 

@@ -11,7 +11,7 @@ import sys
 import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from typing import Any
 
 import mujoco
@@ -127,6 +127,14 @@ class Renderer(mujoco.Renderer):
         self._release()
         _close_at_exit()
         _open_renderers.add(self)
+
+    @cached_property
+    def device(self) -> str:
+        """Name of the renderer: of a graphics card, or of a program with its version."""
+        from OpenGL import GL  # only here: it chooses its back end when it is imported
+
+        with current(self._gl_context):
+            return bytes(GL.glGetString(GL.GL_RENDERER) or b"").decode()
 
     def render(self, *, out: Any = None) -> Any:
         check_process()

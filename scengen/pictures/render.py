@@ -72,6 +72,11 @@ class Camera:
         self._options.sitegroup[:] = 0
         hide_hulls(world.model)
 
+    @property
+    def device(self) -> str:
+        """Name of the renderer that OpenGL uses on this machine."""
+        return self._renderer.device
+
     def frame(self, states: Sequence[State] = (), directions: Directions = VIEWS) -> None:
         """Choose the view that hides least over several states of the world, which ends in the last one."""
         self._view = clearest(self.world, self._aspect, states, directions)

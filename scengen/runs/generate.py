@@ -33,7 +33,7 @@ class GenerateSettings:
 
     split: str = ID
     sampler: str = "iid"
-    n: int = 10
+    n: int = 20
     seed: int = 0
     workers: Workers = 1
     pool: str | None = None

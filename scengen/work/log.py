@@ -11,19 +11,26 @@ from filelock import FileLock, Timeout
 
 from ..errors import BadConfig
 from .plain import MAX_JOURNAL, read_plain
-from .targets import refused
+from .targets import refused, write
 
 
 class Log:
     """Plain records in a file, after a first line that says what they depend on. One writer at a time."""
 
-    def __init__(self, path: Path, identity: Mapping[str, Any], remedy: str = "choose another to="):
+    def __init__(
+        self,
+        path: Path,
+        identity: Mapping[str, Any],
+        remedy: str = "choose another to=",
+        head: Path | None = None,
+    ):
         """
         Args:
             identity: settings on which the records depend; records with another identity are not touched.
             remedy: remedy in the error about such records.
+            head: a separate file for the identity, which then is not the first line.
         """
-        self.path, self.identity, self.remedy = path, dict(identity), remedy
+        self.path, self.identity, self.remedy, self.head = path, dict(identity), remedy, head
         self.records: list[dict[str, Any]] = []
         self._lock = FileLock(path.with_suffix(".lock"))
 
@@ -65,6 +72,14 @@ class Log:
             raise refused(self.path, error) from None
         self.records.append(record)
 
+    def replace(self, records: list[dict[str, Any]]) -> None:
+        """Replace all records of a log with a separate head, at once or not at all."""
+        assert self.head is not None
+        write(self.path, b"".join(json.dumps(record).encode() + b"\n" for record in records))
+        self._file.close()
+        self._file = open(self.path, "ab", buffering=0)  # noqa: SIM115  (closed by `close`)
+        self.records = records
+
     def _open(self) -> None:
         """Read the file and prepare it for more records. A line that a kill has cut short is dropped."""
         try:
@@ -80,14 +95,26 @@ class Log:
         except (ValueError, RecursionError):
             why = "is damaged; move it aside (do not delete it) to start over, or name another folder"
             raise BadConfig(f"{self.path} {why}") from None
-        if whole and whole[0] != self.identity:
-            names = ", ".join(different(whole[0], self.identity))
+        stored = self._stored_identity(whole)
+        if whole and stored != self.identity:
+            names = ", ".join(different(stored, self.identity))
             raise BadConfig(f"{self.path.parent} holds results of other pools or settings ({names}); {self.remedy}")
-        self.records = whole[1:]
+        self.records = whole[1:] if self.head is None else whole
+        if self.head is not None and stored != self.identity:
+            self.head.write_text(json.dumps(self.identity, indent=1, sort_keys=True) + "\n")
         self._file = open(self.path, "ab", buffering=0)  # noqa: SIM115  (closed by `close`)
         self._file.truncate(size)
-        if not whole:
+        if not whole and self.head is None:
             self._write(self.identity)
+
+    def _stored_identity(self, whole: list[dict[str, Any]]) -> Any:
+        """What the records of the file depend on; None if nothing says it."""
+        if self.head is None:
+            return whole[0] if whole else None
+        try:
+            return json.loads(read_plain(self.head))
+        except (ValueError, OSError):
+            return None
 
     def _write(self, record: Mapping[str, Any]) -> None:
         """Append a whole line, or nothing.

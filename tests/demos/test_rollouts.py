@@ -40,7 +40,7 @@ def test_kept_rollouts_say_their_policy_and_are_those_of_the_evaluation(kept):
         found, scenarios = rollouts(kept, policy), {id_ for (id_,) in Pool.open(REFERENCE).columns("id")}
         assert (found.manifest.source, found.manifest.policy, len(found)) == ("policy", policy, successes)
         rows = [*found.rows(), *found.failures()]
-        log = [json.loads(line) for line in (kept / policy / "episodes.jsonl").read_text().splitlines()[1:]]
+        log = [json.loads(line) for line in (kept / policy / "episodes.jsonl").read_text().splitlines()]
         told = {(one["scenario"], one["rollout"]): one["success"] for one in log}
         assert {(row.id, row.run): row.outcome == "success" for row in rows} == told
         assert all(row.style == "policy" and row.id in scenarios and len(row.witness) for row in rows)

@@ -65,7 +65,7 @@ def test_it_plays_whole_episodes_and_the_same_ones_again(checkpoint, monkeypatch
     for name in ("one", "again"):
         given = [f"policy={POLICY}", f"pool={REFERENCE}", "rollouts=1", "seeds=2", "action_repeat=4"]
         assert cli.run(["evaluate", *given, f"observations=[{','.join(streams())}]", f"to={tmp_path / name}"]) == 0
-        lines = (tmp_path / name / "episodes.jsonl").read_text().splitlines()[1:]
+        lines = (tmp_path / name / "episodes.jsonl").read_text().splitlines()
         episodes.append([{k: v for k, v in json.loads(line).items() if "cpu" not in k} for line in lines])
     assert len(episodes[0]) == 2 and episodes[0] == episodes[1]
     assert all(one["seconds"] > 1.0 for one in episodes[0])

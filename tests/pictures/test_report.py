@@ -15,7 +15,7 @@ def test_a_pool_beside_its_own_copy_leaks_every_scenario(tmp_path, capsys):
     page, numbers = tmp_path / "report.html", tmp_path / "report.json"
     assert cli.run(("report", f"pool={REFERENCE},{copy}", f"to={page}", f"json={numbers}")) == 0
     told = json.loads(numbers.read_text())
-    assert len(told["contrasts"][0]["shared"]) == 6 and told["contrasts"][0]["energy"]["distance"] == 0.0
+    assert len(told["contrasts"][0]["shared"]) == 6 and told["contrasts"][0]["apart"]["energy"]["distance"] == 0.0
     assert [p["scenarios"] for p in told["pools"]] == [6, 6] and told["pools"][0]["outside"] == {}
     assert "6 pairs" in page.read_text() and "6 near duplicates" in capsys.readouterr().out
 

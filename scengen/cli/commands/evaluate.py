@@ -3,19 +3,23 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...compose import load_task
 from ...demos.rollouts import Keeper
+from ...evaluate.arms import BENIGN
+from ...evaluate.benign import benign_pools
 from ...evaluate.comparison import MAX_SHOWN, Comparison, PolicyResult
 from ...evaluate.edition import Edition, check_pool, chosen_sets, evaluation_pools
 from ...evaluate.policies import find_policy
 from ...evaluate.rollouts import Evaluation, evaluate
-from ...evaluate.settings import EvaluateSettings, other_version
+from ...evaluate.scenarios import different_sizes
+from ...evaluate.settings import PROFILE, EvaluateSettings, other_version
 from ...pool import Pool
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
-from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write, write_json
+from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write
 from .settings import read
 
 
@@ -30,6 +34,11 @@ def command(arguments: Arguments) -> int:
         folders = _edition_pools(settings, settings.edition)
         settings = replace(settings, pool=folders)
         every = settings.several()
+    if BENIGN in (settings.chosen_arms or ()):
+        settings = replace(settings, benign=_benign_pools(settings, search_path(arguments)))
+        every = settings.several()
+    if told := different_sizes([*map(Pool.open, settings.folders)], settings):
+        remark(told)
     results, search = [], search_path(arguments)
     for one in every:
         if difference := other_version(one, search):
@@ -38,13 +47,19 @@ def command(arguments: Arguments) -> int:
             results.append(PolicyResult(one, _evaluated(one, progress_bar.of, search)))
     compared = Comparison(results)
     _show(compared, settings)
-    write(settings.folder / "table.md", compared.markdown)
-    write_json(str(settings.folder / "table.json"), compared.plain)
+    for path, text in compared.files(settings.folder).items():
+        write(path, text)
+    if PROFILE in settings.format:
+        from ...evaluate.profile import plots  # only here: matplotlib starts slowly
+
+        for path, content in plots(compared).items():
+            write(path, content)
     incomplete = [_report(result) for result in results]
     if len(results) > 1:
         for result in results:
-            say(f"wrote {result.settings.folder}: episodes.jsonl")
-    say(f"wrote {settings.folder}: table.md, table.json{'' if len(results) > 1 else ', episodes.jsonl'}")
+            say(f"wrote {result.settings.folder}: episodes.jsonl, episodes.csv")
+    lines = "" if len(results) > 1 else ", episodes.jsonl, episodes.csv"
+    say(f"wrote {settings.folder}: table.md, table.json{lines}")
     return FAILED if any(incomplete) else OK
 
 
@@ -65,6 +80,14 @@ def _edition_pools(settings: EvaluateSettings, edition: str) -> list[str]:
         )
 
 
+def _benign_pools(settings: EvaluateSettings, search: Sequence[str]) -> list[str]:
+    """The pools of the arm `benign`."""
+    with ProgressBar(err, "benign", 1, settings.workers) as progress_bar:
+        return benign_pools(
+            settings, search, lambda task, done, total: progress_bar.of(done, total, f"certify {task}, fresh draws")
+        )
+
+
 def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None], search: Sequence[str]) -> Evaluation:
     """Evaluate one policy, and keep its rollouts if that is requested."""
     if not settings.keep:
@@ -80,24 +103,29 @@ def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None],
 
 def _show(compared: Comparison, settings: EvaluateSettings) -> None:
     """Print the tables and the headlines."""
-    title = f"{', '.join(one.name for one in settings.several())}: success [%], {settings.rules} rules"
-    shown = Table(*compared.head, title=title, title_justify="left")
-    for row in compared.rows():
-        shown.add_row(*row)
-    out.print(shown)
+    titles, cells, common = compared.table()
+    what = ", ".join([*([common["task"]] if "task" in common else []), *(one.name for one in settings.several())])
+    out.print(_table(f"{what}: success [%], {settings.rules} rules", titles, cells))
+    if "change" in titles:
+        say("change: to training, twin by twin if there are twins; under a condition, to the same clean episodes")
     for title, head, rows in (
         ("goal reached otherwise than by the means of the task", compared.way_head, [*compared.way_rows()]),
         ("failures", compared.failure_head, [*compared.failure_rows()]),
     ):
         if rows:
-            why = Table(*head, title=title, title_justify="left")
-            for row in rows[:MAX_SHOWN]:
-                why.add_row(*row)
-            out.print(why)
+            out.print(_table(title, head, rows[:MAX_SHOWN]))
         if (more := len(rows) - MAX_SHOWN) > 0:
             say(f"{more} more lines are in table.md")
     for line in compared.headlines:
         say(line)
+
+
+def _table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """A table without lines between columns, so that it fits 80 columns."""
+    table = Table(*head, title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 def _report(result: PolicyResult) -> bool:

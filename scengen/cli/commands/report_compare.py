@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadConfig
+from ...ood.analysis.contrast import apart
 from ...ood.analysis.coverage import evenness
 from ...ood.analysis.distance import (
     MAX_ENERGY_SCENARIOS,
     MAX_PAIRS,
     NearDuplicate,
-    energy,
     near_duplicates,
     per_parameter,
 )
-from ...ood.analysis.redraw import batch_of, first_scenarios, redrawn, sampled_indices, task_of
-from ...ood.analysis.space import Batch, of_features
+from ...ood.analysis.redraw import batch_of, redrawn, sampled_indices, task_of
+from ...ood.analysis.space import Batch
 from ...ood.analysis.tables import SHOWN_PAIRS, pairs_table
 from ...pool import Pool
 from ...samplers.task import Task
@@ -94,14 +94,9 @@ Side = tuple[Pool, Batch]
 def _contrast(task: Task, one: Side, other: Side, settings: CompareSettings) -> dict[str, Any]:
     """Print and return the energy distance between the first pool and another one, and their near duplicates."""
     (pool, here), (beside, there) = one, other
-    ones, others = (first_scenarios(task, of, MAX_ENERGY_SCENARIOS) for of in (pool, beside))
-    space = of_features(task, ones, others)
-    apart = energy(space.points(ones), space.points(others), settings.permutations)
+    found = apart(task, pool, beside, settings.permutations)
     few = f" of the first {MAX_ENERGY_SCENARIOS} scenarios" if max(len(here), len(there)) > MAX_ENERGY_SCENARIOS else ""
-    say(
-        f"{pool.folder} to {beside.folder}: energy distance {apart.distance:.3f} over {', '.join(space.names)} "
-        f"[training ranges], p = {apart.pvalue:.3f}{few}"
-    )
+    say(f"{pool.folder} to {beside.folder}: {found} [training ranges]{few}")
     pairs = near_duplicates(task, here, there, settings.within)
     if pairs:
         out.print(pairs_table(pairs, str(pool.folder), str(beside.folder), names([pool, beside], _ids(pairs))))
@@ -109,8 +104,7 @@ def _contrast(task: Task, one: Side, other: Side, settings: CompareSettings) -> 
     say(f"  nearer than {settings.within:g} training widths in every parameter: {len(pairs)} pairs{more}")
     return {
         "pools": [str(pool.folder), str(beside.folder)],
-        "over": space.names,
-        "energy": asdict(apart),
+        **asdict(found),
         "near_duplicates": [asdict(p) for p in pairs],
     }
 

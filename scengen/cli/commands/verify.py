@@ -15,6 +15,9 @@ from ...attack.check import attacked
 from ...attack.evidence import Hit, unsound
 from ...demos.verify import verify_demonstrations
 from ...errors import BadConfig, UnknownName, cut
+from ...evaluate.audit import audit
+from ...evaluate.audit_report import SAMPLE
+from ...evaluate.audit_report import Options as AuditOptions
 from ...evidence.reproduction import LIMITS as REPRODUCTION_LIMITS
 from ...evidence.reproduction import reproduced
 from ...ood.analysis.redraw import task_of
@@ -55,6 +58,7 @@ class VerifySettings:
 
     pool: str | list[str] | None
     hits: str | None
+    results: str | None
     task: str | None
     level: str
     sample: int | None
@@ -86,8 +90,10 @@ def command(arguments: Arguments) -> int:
     try_file(settings.junit)
     if settings.hits is not None:
         return _replay_hits(settings.hits, settings.pool, search_path(arguments))
+    if settings.results is not None:
+        return _audit_results(Path(settings.results), settings, search_path(arguments))
     if settings.pool is None:
-        raise BadConfig("verify needs pool=FOLDER, hits=FILE or task=NAME; see scengen verify --help")
+        raise BadConfig("verify needs pool=FOLDER, results=FOLDER, hits=FILE or task=NAME; see scengen verify --help")
     demonstrated = [f for f in demonstration_folders(settings.pool) if is_demonstrations(f)]
     if demonstrated:
         return _replay_demonstrations(demonstrated, settings, search_path(arguments))
@@ -196,7 +202,7 @@ def _reproduce(chosen: str, settings: VerifySettings, search: Sequence[str]) -> 
         BadConfig: a setting is given that is for pools.
         UnknownName: there is no such task.
     """
-    for name in ("pool", "hits", "sample", "ycb", "apart", "junit"):
+    for name in ("pool", "hits", "results", "sample", "ycb", "apart", "junit"):
         if getattr(settings, name) is not None:
             raise BadConfig(
                 f"{name} is for pools; task={chosen} compares tasks with their stored behaviour: leave it out"
@@ -258,6 +264,47 @@ def _replay_hits(hits: str, pool: str | list[str] | None, search: Sequence[str])
     return FAILED if wrong else OK
 
 
+def _audit_results(folder: Path, settings: VerifySettings, search: Sequence[str]) -> int:
+    """Verify the results of an evaluation.
+
+    Returns:
+        Exit status.
+
+    Raises:
+        BadConfig: a setting is for pools alone, or the folder holds no results.
+    """
+    for name in ("hits", "ycb", "apart", "junit"):
+        if getattr(settings, name) is not None:
+            raise BadConfig(f"{name} is not for results: leave it out")
+    sample = None if settings.level == "full" else settings.sample or SAMPLE
+    seed = secrets.randbelow(2**32) if settings.seed is None else settings.seed
+    pools = several(settings.pool) if settings.pool else ()
+    with ProgressBar(err, f"verify {folder}", 1, settings.workers) as progress_bar:
+        options = AuditOptions(sample, seed, pools, settings.workers, search)
+        reports = audit(folder, options, progress_bar.of)
+    for report in reports:
+        _print_faults(report.faults, report.declined)
+        for remark in report.remarks:
+            say(remark)
+        say(f"claimed, and not checked: {'; '.join(report.claimed)}")
+        done = f"{report.rebuilt} of {report.lines} lines rebuilt, {report.pictures} with pictures"
+        say(f"{report.folder}: {report.verdict}: {done}, {report.replayed} replayed to the end")
+    if settings.json:
+        write_json(settings.json, [{**vars(report), "verdict": report.verdict} for report in reports])
+    verdicts = Counter(report.verdict for report in reports)
+    return next(status for verdict, status in WORST.items() if verdicts[verdict])
+
+
+def _print_faults(faults: Sequence[str], declined: Sequence[str]) -> None:
+    """Print the first faults, and what could not be decided."""
+    for fault in faults[:MAX_PRINTED]:
+        warn(f"REFUTED {fault[:2000]}")
+    for why in declined[:MAX_PRINTED]:
+        warn(f"DECLINED {why[:2000]}")
+    if (more := len(faults) + len(declined) - MAX_PRINTED) > 0:
+        warn(f"and {more} more; json=FILE writes all")
+
+
 def _replay_demonstrations(folders: Sequence[str], settings: VerifySettings, search: Sequence[str]) -> int:
     """Verify folders of demonstrations.
 
@@ -281,10 +328,7 @@ def _replay_demonstrations(folders: Sequence[str], settings: VerifySettings, sea
             named = [pool for pool in pools if pool.sha256 in found.manifest.config.apart]
             report = verify_demonstrations(found, task, settings.workers, limits, oracle, progress_bar.show, named)
         _print_differences(report.differences)
-        for fault in report.faults[:MAX_PRINTED]:
-            warn(f"REFUTED {fault[:2000]}")
-        for why in report.declined[:MAX_PRINTED]:
-            warn(f"DECLINED {why[:2000]}")
+        _print_faults(report.faults, report.declined)
         for remark in report.remarks:
             say(remark)
         if report.claimed:

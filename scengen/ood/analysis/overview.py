@@ -21,20 +21,19 @@ from ...samplers.split import ID
 from ...samplers.task import Task
 from ...work.targets import write
 from .bias import Bias, bias
+from .contrast import Apart, apart
 from .coverage import Evenness, evenness
 from .distance import (
     MAX_ENERGY_SCENARIOS,
     MAX_PAIRS,
     NEAR_DUPLICATE_DISTANCE,
-    Energy,
     NearDuplicate,
-    energy,
     near_duplicates,
     per_parameter,
 )
 from .histogram import Histogram, figure, histogram, label
-from .redraw import batch_of, first_scenarios, redrawn, sampled_indices, task_of
-from .space import Batch, measured, of_features
+from .redraw import batch_of, redrawn, sampled_indices, task_of
+from .space import Batch, measured
 
 SHOWN_SCENES = 4
 """Number of scenes that are shown of each pool."""
@@ -77,8 +76,8 @@ class Contrast:
 
     one: str
     other: str
-    energy: Energy
-    """Energy distance between the features of the two pools [training ranges]."""
+    apart: Apart
+    """Distance between the two pools."""
     shared: list[NearDuplicate]
     """Near duplicates: leakage, if one pool is for training and the other for evaluation."""
 
@@ -204,7 +203,4 @@ Side = tuple[Pool, Batch]
 
 def _contrast(task: Task, one: Side, other: Side) -> Contrast:
     (a, here), (b, there) = one, other
-    ones, others = (first_scenarios(task, pool, MAX_ENERGY_SCENARIOS) for pool in (a, b))
-    space = of_features(task, ones, others)
-    apart = energy(space.points(ones), space.points(others))
-    return Contrast(str(a.folder), str(b.folder), apart, near_duplicates(task, here, there))
+    return Contrast(str(a.folder), str(b.folder), apart(task, a, b), near_duplicates(task, here, there))

@@ -134,3 +134,9 @@ def of_features(task: Task, training: Sequence[Scenario], others: Sequence[Scena
         return of_parameters(task, [*training, *others])
     ranges = {n: max(f[n] for f in every) - min(f[n] for f in every) for n in every[0]}
     return Space(tuple(Column(n, span or 1.0) for n, span in ranges.items()))
+
+
+def with_parameters(space: Space, task: Task, names: Sequence[str]) -> Space:
+    """Coordinates with those of more parameters, in training widths."""
+    more = [name for name in names if name not in space.names]
+    return Space((*space.columns, *(Column(name, scale(task, name), task.known[name].period) for name in more)))

@@ -1,0 +1,108 @@
+"""Arms of an evaluation: the same episodes with an input taken away or exchanged, to measure whether it is used.
+
+* `blind`: all pictures are black.
+* `wrong`: the instruction is that of another task.
+* `benign`: fresh training scenarios, see `evaluate.benign`. Nothing is taken away.
+* `reworded`: the instruction is another wording of the task's own, from `conf/language/<task>.yaml`.
+
+But for `benign`, scenario, physics and random numbers of the policy are those of the clean episode.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadConfig, UnknownName
+from ..perturb.language import Words
+from ..pool import PoolRow
+from ..samplers.keyed import unit
+from ..samplers.task_files import about, tasks
+
+CLEAN = "clean"
+"""Name of the arm without an intervention."""
+AUTO = "auto"
+"""Value of `arms` for those that ask about an input that the policy has."""
+BENIGN = "benign"
+"""Name of the arm of fresh training scenarios."""
+NONE = "none"
+"""Value of `arms` for no arm."""
+PICTURES = "pictures"
+"""Input of a policy: cameras."""
+LANGUAGE = "language"
+"""Input of a policy: the instruction."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """An intervention."""
+
+    name: str
+    needs: str
+    """Input of the policy that it changes: `pictures` or `language`; empty if it is none."""
+    title: str
+    """What the policy gets, for sentences."""
+    automatic: bool = True
+    """Whether `arms=auto` has it for a policy with this input."""
+    instruct: Callable[[PoolRow, Sequence[str]], str] | None = None
+    """Gives the instruction for a scenario, given the search path of task files; None for its own."""
+
+
+def wrong_instruction(row: PoolRow, search: Sequence[str] = ()) -> str:
+    """The instruction of another task, which depends on the scenario alone."""
+    others = sorted({text for text in _instructions(tuple(search)) if text != row.instruction})
+    return others[int(len(others) * unit("wrong instruction", row.id))]
+
+
+@cache
+def _instructions(search: tuple[str, ...]) -> tuple[str, ...]:
+    """Instructions of all tasks."""
+    return tuple(about(name, search).instruction for name in tasks(search))
+
+
+def reworded_instruction(row: PoolRow, search: Sequence[str] = ()) -> str:
+    """Another wording of the instruction, which depends on the scenario alone.
+
+    Raises:
+        BadConfig: the task has none.
+    """
+    words = Words.of(row.task, row.instruction, search)
+    if not words.wordings:
+        why = f"arms = reworded, but {row.task} has no conf/language/{row.task}.yaml; write it, or leave the arm out"
+        raise BadConfig(why)
+    texts = words.wordings["reworded"]
+    return texts[int(len(texts) * unit("reworded instruction", row.id))]
+
+
+ARMS: Mapping[str, Arm] = {
+    arm.name: arm
+    for arm in (
+        Arm("blind", PICTURES, "black pictures"),
+        Arm("wrong", LANGUAGE, "the instruction of another task", instruct=wrong_instruction),
+        Arm(BENIGN, "", "fresh training scenarios", False),
+        Arm("reworded", LANGUAGE, "another wording of the instruction", False, reworded_instruction),
+    )
+}
+"""All arms by name."""
+
+
+def check_arms(names: Iterable[str]) -> None:
+    """Raise `UnknownName` for an unknown name."""
+    for name in names:
+        if name not in ARMS:
+            raise UnknownName("arm", name, [*ARMS, AUTO, NONE])
+
+
+def instruction(arm: str, row: PoolRow, search: Sequence[str] = ()) -> str | None:
+    """The instruction that an arm gives instead of the scenario's own; None for its own."""
+    give = ARMS[arm].instruct if arm in ARMS else None
+    return None if give is None else give(row, search)
+
+
+def seen_by(arm: str, observation: dict[str, Any], cameras: Iterable[str]) -> dict[str, Any]:
+    """What a policy sees of an observation."""
+    if arm == CLEAN or ARMS[arm].needs != PICTURES:
+        return observation
+    return {**observation, **{camera: np.zeros_like(observation[camera]) for camera in cameras}}

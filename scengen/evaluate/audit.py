@@ -1,0 +1,299 @@
+"""Verification of the results of an evaluation: lines, scenarios, starts, outcomes with kept actions, figures."""
+
+import json
+import random
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..compose import load_task
+from ..episode import Actions
+from ..errors import BadConfig, ScengenError, cut
+from ..pool import Pool, kinds
+from ..pool.demonstrations import Demonstrations, is_demonstrations
+from ..pool.manifest import MANIFEST
+from ..pool.untrusted import read_json
+from ..validate.verify.spot import excluded_share
+from ..work.log import different
+from ..work.parallel import UNTRUSTED_LIMITS, each
+from ..work.plain import MAX_JOURNAL, read_plain
+from ..work.typed import typed
+from .audit_report import Options, ResultsReport
+from .claims import Fault, broken, incomplete, malformed, untrue
+from .comparison import TABLE, Comparison, PolicyResult
+from .lines import CHAIN, CSV, FORMAT, RUN, kept_folder, read_lines
+from .rebuilding import Rebuilder, Rebuilt, lost
+from .rollouts import Evaluation, here, id_of, order, wanted
+from .scenarios import Scenarios, chosen, known, not_playable
+from .settings import EvaluateSettings, RolloutId
+
+
+def audit(folder: Path, options: Options, progress: Callable[[int, int], None]) -> list[ResultsReport]:
+    """Verify a folder of results: the episodes of each policy, then the tables.
+
+    Args:
+        progress: called with the number of rebuilt lines, and their total.
+
+    Raises:
+        BadConfig: the folder holds no results of this format, or a pool is not here.
+    """
+    stored = _mapping(folder / TABLE)
+    audits = [_Audit(folder, told, options) for told in stored.get("policies", [stored])]
+    for one in audits:
+        one.run(progress)
+    if all(one.readable for one in audits):
+        try:
+            audits[0].report.faults += _other_tables(folder, stored, audits)
+        except ScengenError as error:
+            audits[0].report.declined.append(f"the tables were not compared: {error}")
+    return [one.report for one in audits]
+
+
+def _other_tables(folder: Path, stored: Mapping[str, Any], audits: Sequence["_Audit"]) -> Iterator[str]:
+    """Differences between the files of results and those that the lines give.
+
+    Another version of scengen has the same figures and may have other words: then figures alone are compared.
+    """
+    same = not any(one.versions for one in audits)
+    for path, text in Comparison([one.result for one in audits]).files(folder).items():
+        if path.name == TABLE:
+            there = json.loads(text)
+            names = different(dict(stored), there) if same else different(_figures(stored), _figures(there))
+            if names:
+                yield f"{path.name} has other figures than its lines give: {', '.join(names[:5])}"
+        elif (same or path.name == CSV) and not (path.is_file() and path.read_text() == text):
+            yield f"{path} is not the one that its lines give"
+
+
+def _figures(plain: Mapping[str, Any]) -> dict[str, Any]:
+    """The figures of a table without words about them, of each policy."""
+    every = [told if isinstance(told, dict) else {} for told in plain.get("policies", [plain])]
+    names = ("table", "conditions", "interactions", "episodes_sha256")
+    return {f"{k}.{name}": _without_words(told.get(name)) for k, told in enumerate(every) for name in names}
+
+
+def _without_words(some: Any) -> Any:
+    return [{k: v for k, v in one.items() if k != "told"} for one in some] if isinstance(some, list) else some
+
+
+def _mapping(path: Path) -> dict[str, Any]:
+    """Content of a file of results.
+
+    Raises:
+        BadConfig: it cannot be read, or holds something else.
+    """
+    try:
+        found = read_json(read_plain(path, MAX_JOURNAL).decode(), MAX_JOURNAL)
+    except (ValueError, OSError) as error:
+        why = " ".join(str(error).split())[:160]
+        raise BadConfig(f"{path} cannot be read: {why}; give a folder that scengen evaluate wrote") from None
+    if not isinstance(found, dict):
+        raise BadConfig(f"{path} is not a mapping; give a folder that scengen evaluate wrote")
+    return found
+
+
+def _pool_here(name: str, sha256: str, given: Sequence[Pool]) -> Pool:
+    """The pool of a run.
+
+    Raises:
+        BadConfig: it is neither among the given ones nor in the folder that the run names.
+    """
+    for pool in given:
+        if pool.sha256 == sha256:
+            return pool
+    if Path(name, MANIFEST).is_file() and (pool := Pool.open(name).check()).sha256 == sha256:
+        return pool
+    raise BadConfig(f"the pool {name} of these results (sha256 {sha256[:12]}) is not here; pass pool=FOLDER")
+
+
+class _Audit:
+    """Verification of the episodes of one policy."""
+
+    def __init__(self, folder: Path, stored: Any, options: Options):
+        if not isinstance(stored, Mapping) or "settings" not in stored:
+            raise BadConfig(f"{folder / TABLE} is of an earlier release, whose lines cannot be rebuilt; evaluate again")
+        self.stored, self.options = stored, options
+        self.folder = folder / str(stored["folder"])
+        self.told = typed("settings", EvaluateSettings, {**stored["settings"], "to": str(self.folder)})
+        self.of_run = _mapping(self.folder / RUN)
+        if (given := self.of_run.get("format")) != FORMAT:
+            raise BadConfig(f"{self.folder / RUN} has format {cut(repr(given), 20)}; this version reads {FORMAT}")
+        self.lines, self.readable = read_lines(self.folder / kinds.EPISODES), False
+        self.report, self.sampled = ResultsReport(str(self.folder), len(self.lines)), 0
+        self._actions: dict[Path, dict[tuple[str, int], Actions]] = {}
+        given = [Pool.open(folder).check() for folder in options.pools]
+        named = {**self.of_run["pools"], **stored.get("benign", {})}
+        self.pools = {name: _pool_here(name, sha256, given) for name, sha256 in named.items()}
+
+    @cached_property
+    def settings(self) -> EvaluateSettings:
+        """Settings of the run, with the folders in which the pools are here."""
+        names = [name for name in self.of_run if name in vars(self.told) and name != "policy"]
+        here = {name: str(pool.folder) for name, pool in self.pools.items()}
+        fresh = [here[name] for name in self.stored.get("benign", {})]
+        usual = [here[name] for name in self.of_run["pools"]]
+        return replace(self.told, pool=usual, benign=fresh, **{name: self.of_run[name] for name in names})
+
+    @property
+    def result(self) -> PolicyResult:
+        """The result that the lines give."""
+        lines = sorted((line for line in self.lines if id_of(line) in self.wanted), key=order)
+        arms = self.stored.get("arms", [])
+        end = self.lines[-1][CHAIN] if lines else ""
+        return PolicyResult(self.told, Evaluation(lines, 0, self.lost, arms, self.stored.get("benign", {}), end))
+
+    def run(self, progress: Callable[[int, int], None]) -> None:
+        """Check form, order, completeness and claims of all lines, and rebuild a sample."""
+        if self._tell(malformed(self.lines)):
+            return
+        self.readable = True
+        self._tell(broken(self.of_run, self.lines, self.stored.get("episodes_sha256")))
+        self._tell(incomplete(self.lines, self.wanted))
+        self._tell((None, text) for text in self._other_run())
+        for number, line in enumerate(self.lines):
+            self._tell((number, text) for text in untrue(line, self._every, self.of_run, self.told.name))
+        self._tell(self._crashed_with_actions())
+        self._rebuild(progress)
+        self._remarks()
+
+    def _tell(self, faults: Iterable[Fault]) -> bool:
+        """Add faults to the report. Returns whether there are any."""
+        told = [text if number is None else f"line {number} {text}" for number, text in faults]
+        self.report.faults += told
+        return bool(told)
+
+    # --- what was to be played ----------------------------------------------------------------
+
+    @cached_property
+    def wanted(self) -> set[RolloutId]:
+        """The rollouts of the table."""
+        about = {key: told for key, told in self._chosen.items() if key[1] not in self.lost}
+        return wanted(about, self.told) | wanted(about, self.told, self.stored.get("arms", []))
+
+    @cached_property
+    def lost(self) -> dict[str, str]:
+        """Scenarios that the results leave out, with the reasons."""
+        return dict(self.stored.get("lost", {}))
+
+    @cached_property
+    def _chosen(self) -> Scenarios:
+        fresh = self.stored.get("benign", {})
+        sides = [[p for name, p in self.pools.items() if (name in fresh) == side] for side in (False, True)]
+        some = (chosen(pools, self.settings, self.options.search) for pools in sides if pools)
+        return self._as_named({key: told for each in some for key, told in each.items()})
+
+    @cached_property
+    def _every(self) -> Scenarios:
+        every = (known(pool, self.options.search) for pool in self.pools.values())
+        return self._as_named({key: told for some in every for key, told in some.items()})
+
+    def _as_named(self, some: Scenarios) -> Scenarios:
+        """Scenarios under the folders that the lines name."""
+        named = {str(pool.folder): name for name, pool in self.pools.items()}
+        return {(named[folder], id_): told for (folder, id_), told in some.items()}
+
+    def _other_run(self) -> Iterator[str]:
+        """Settings of the table that are not those of the run, and scenarios that are left out without a reason."""
+        for name in ("policy", "version", "rules", "perturb_seed"):
+            if self.of_run.get(name) != getattr(self.told, name):
+                yield f"{TABLE} says {name} = {getattr(self.told, name)!r:.60}, {RUN} has {self.of_run.get(name)!r:.60}"
+        for task, version in self.of_run["task_versions"].items():
+            if text := load_task(task, self.options.search).other_version("played on", version):
+                self.report.declined.append(text)
+        here = {str(pool.folder): pool for pool in self.pools.values()}
+        every = (known(pool, self.options.search) for pool in here.values())
+        left_out = {key: told for some in every for key, told in some.items() if key[1] in self.lost}
+        fails = not_playable([*here.values()], left_out, self.options.workers) if left_out else {}
+        for id_ in sorted(self.lost):
+            if id_ not in fails:
+                yield f"{id_} was left out as unplayable, but it can be played"
+
+    # --- rebuilding ---------------------------------------------------------------------------
+
+    def _rebuild(self, progress: Callable[[int, int], None]) -> None:
+        """Rebuild a sample of the lines that name a scenario of the pools and a state."""
+        count, rng = len(self.lines), random.Random(self.options.seed)
+        some = (
+            range(count) if self.options.sample is None else rng.sample(range(count), min(self.options.sample, count))
+        )
+        numbers = [number for number in some if self._can_be_rebuilt(self.lines[number])]
+        numbers.sort(key=lambda number: id_of(self.lines[number]))
+        items = [(number, self.lines[number], self._kept(number)) for number in numbers]
+        rebuilder = Rebuilder(self.settings, self.of_run["observed"], self.options.search)
+        for done, one in enumerate(each(rebuilder, items, self.options.workers, UNTRUSTED_LIMITS, lost), 1):
+            self._count(one)
+            progress(done, len(items))
+        self.sampled = len(some)
+
+    def _can_be_rebuilt(self, line: Mapping[str, Any]) -> bool:
+        return not line["crashed"] and (line["pool"], line["scenario"]) in self._every
+
+    def _count(self, one: Rebuilt) -> None:
+        self._tell((one.number, fault) for fault in one.faults)
+        if one.lost:
+            self.report.declined.append(f"line {one.number}: rebuilding it {one.lost}")
+        self.report.rebuilt += not one.lost
+        self.report.pictures += one.pictures
+        self.report.replayed += one.replayed
+
+    def _kept(self, number: int) -> Actions | None:
+        """The actions of a line that were kept."""
+        which = id_of(self.lines[number])
+        actions = self._kept_of(which).get((which.scenario, which.rollout))
+        if actions is None and self.of_run.get("keep"):
+            self._tell([(number, f"has no kept actions in {kept_folder(self.folder, which)}")])
+        return actions
+
+    def _kept_of(self, which: RolloutId) -> Mapping[tuple[str, int], Actions]:
+        """The kept actions of the folder of a rollout, by scenario and number."""
+        folder = kept_folder(self.folder, which)
+        if folder not in self._actions:
+            found = Demonstrations.open(folder) if is_demonstrations(folder) else None
+            rows = [] if found is None else [*found.rows(), *found.failures()]
+            self._actions[folder] = {(row.id, row.run): row.witness for row in rows}
+        return self._actions[folder]
+
+    def _crashed_with_actions(self) -> Iterator[Fault]:
+        """Lines of crashes whose episode was played to its end: its actions were kept."""
+        for number, line in enumerate(self.lines):
+            which = id_of(line)
+            if line["crashed"] and (which.scenario, which.rollout) in self._kept_of(which):
+                yield number, "says that the policy crashed, but the actions of a whole episode were kept"
+
+    # --- what is not known --------------------------------------------------------------------
+
+    def _remarks(self) -> None:
+        """State what was not checked."""
+        report, count = self.report, len(self.lines)
+        if self.sampled < count:
+            share = 100 * excluded_share(count, self.sampled)
+            bound = f"a share of {share:.3g} % or more of lines that cannot be rebuilt is excluded at 95 %"
+            report.remarks.append(f"{self.sampled} of {count} lines rebuilt, seed {self.options.seed}: {bound}")
+        if count > len(self.wanted):
+            report.remarks.append(f"{count - len(self.wanted)} lines are of a longer run, and not in the table")
+        report.remarks += self._other_machines()
+        if self.versions:
+            report.remarks.append("words of the tables are those of another version; their figures alone are compared")
+        seen = sum(bool(line["pictures"]) for line in self.lines)
+        if seen and report.pictures < min(report.rebuilt, seen):
+            report.remarks.append(f"first pictures of {report.pictures} lines compared: others are of another renderer")
+        if count > report.replayed:
+            report.claimed.append(f"outcomes of {count - report.replayed} lines: their actions were not played again")
+        if crashed := sum(bool(line["crashed"]) for line in self.lines):
+            report.claimed.append(f"that the policy crashed in {crashed} episodes")
+        report.claimed.append("that this policy chose the actions, and whether it read the instruction")
+
+    @property
+    def versions(self) -> bool:
+        """Whether a line was written by another version of scengen."""
+        return any(line["scengen"] != here()["scengen"] for line in self.lines)
+
+    def _other_machines(self) -> Iterator[str]:
+        """Versions and rounding under which lines were played, where they are not those here."""
+        for name, there in here().items():
+            for other, count in Counter(line[name] for line in self.lines if line[name] != there).items():
+                what = "; their states and outcomes alone are compared" if name == "machine" else ""
+                yield f"{count} lines were played with {name} {cut(other, 40)}, this is {there}{what}"
