@@ -16,6 +16,7 @@ from scengen.evaluate.lines import read_lines
 from scengen.evaluate.rollouts import Evaluation
 from scengen.evaluate.settings import EvaluateSettings
 from scengen.evaluate.statistics import contrast, difference, paired, rate, smallest_visible_drop
+from scengen.perturb.language import Words
 from scengen.pool import Pool
 from scengen.tasks.domino_single import DominoSingle
 
@@ -146,11 +147,12 @@ def test_a_policy_that_reads_the_instruction_also_gets_a_wrong_one(tmp_path, mon
     assert json.loads((tmp_path / "out" / "table.json").read_text())["arms"] == ["wrong"]
 
 
-def test_arms_without_texts_or_a_name_are_refused(tmp_path, capsys):
+def test_an_arm_has_another_wording_and_an_unknown_one_is_refused(tmp_path, capsys):
     words = ("evaluate", "policy=idle", f"pool={REFERENCE}", "seeds=1", "rollouts=1", f"to={tmp_path / 'out'}")
     assert cli.run([*words, "arms=blnd"]) == 2 and "did you mean 'blind'" in capsys.readouterr().err
-    assert cli.run([*words, "arms=reworded", "action_repeat=100"]) == 2
-    assert "domino_single has no conf/language/domino_single.yaml" in capsys.readouterr().err
+    assert cli.run([*words, "arms=reworded", "action_repeat=100"]) == 0
+    clean, reworded = read_lines(tmp_path / "out" / "episodes.jsonl")
+    assert reworded["instruction"] in Words.of("domino_single", clean["instruction"]).wordings["reworded"]
 
 
 def test_fresh_training_scenarios_are_an_arm_that_is_verified_too(tmp_path, capsys):
