@@ -99,7 +99,7 @@ class WitnessReplay:
     """Function that reads the streams in every control period."""
     rules: Rules = STRICT
     """Rules of the episode."""
-    calibrations: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
+    calibrations: Mapping[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]])
     """Calibration of each recorded camera, by the paper's name."""
     instruction: str = ""
     """The instruction as it is given."""

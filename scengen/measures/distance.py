@@ -1,5 +1,7 @@
 """How far a picture is from another one, in one unit for all kinds of perturbation."""
 
+from typing import Any
+
 import numpy as np
 
 from ..errors import BadConfig
@@ -22,5 +24,6 @@ def distance(one: Picture, other: Picture) -> float:
     except ImportError:
         raise BadConfig("distances of pictures need scikit-image; pip install 'scengen[proofs]'") from None
     window = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
-    structure = structural_similarity(one, other, channel_axis=2, data_range=255, **window)
-    return float(1.0 - structure + np.mean(deltaE_cie76(rgb2lab(one), rgb2lab(other))) / 100.0)
+    structure: Any = structural_similarity(one, other, channel_axis=2, data_range=255, **window)
+    colour = np.mean(deltaE_cie76(rgb2lab(one), rgb2lab(other)))
+    return 1.0 - float(structure) + float(colour) / 100.0

@@ -146,8 +146,8 @@ class Renderer(mujoco.Renderer):
     def refresh(self) -> None:
         """Upload all textures again."""
         with current(self._gl_context):
-            for texture in range(self._model.ntex):
-                mujoco.mjr_uploadTexture(self._model, self._mjr_context, texture)
+            for texture in range(self.model.ntex):
+                mujoco.mjr_uploadTexture(self.model, self._mjr_context, texture)
 
     def close(self) -> None:
         """Free the textures while their own context is current, because contexts number alike; then the context."""

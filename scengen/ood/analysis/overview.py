@@ -120,7 +120,7 @@ def page(
             if not remark and len(pool):
                 scenes = itertools.islice(pool.columns("scene_xml", "embodiment"), SHOWN_SCENES)
                 directions = directions_of(pool, task_of(pool, search))
-                shown = [thumbnail(*scene, directions) for scene in scenes]
+                shown = [thumbnail(text, embodiment, directions) for text, embodiment in scenes]
         except render.NoPictures as error:
             remark = str(error)
         plot = svg(figure(overview.histograms)) if overview.histograms else ""
