@@ -69,7 +69,7 @@ def client(tmp_path):
 
 
 def play(address, file, to, **changes):
-    said = {"pool": REFERENCE, "seeds": 1, "rollouts": 1, "to": str(to), "client": file, **changes}
+    said = {"pool": REFERENCE, "seeds": 1, "rollouts": 1, "to": str(to), "client": file, "arms": "none", **changes}
     return evaluate(EvaluateSettings(policy=address, **said), lambda *_: None).episodes
 
 

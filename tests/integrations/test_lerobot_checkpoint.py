@@ -63,7 +63,7 @@ def test_it_plays_whole_episodes_and_the_same_ones_again(checkpoint, monkeypatch
     monkeypatch.setenv("LEROBOT_CHECKPOINT", str(checkpoint))
     episodes = []
     for name in ("one", "again"):
-        given = [f"policy={POLICY}", f"pool={REFERENCE}", "rollouts=1", "seeds=2", "action_repeat=4"]
+        given = [f"policy={POLICY}", f"pool={REFERENCE}", "rollouts=1", "seeds=2", "action_repeat=4", "arms=none"]
         assert cli.run(["evaluate", *given, f"observations=[{','.join(streams())}]", f"to={tmp_path / name}"]) == 0
         lines = (tmp_path / name / "episodes.jsonl").read_text().splitlines()
         episodes.append([{k: v for k, v in json.loads(line).items() if "cpu" not in k} for line in lines])
