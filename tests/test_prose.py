@@ -19,14 +19,14 @@ TEXTS = [
     ROOT / "README.md",
     ROOT / "CONTRIBUTING.md",
     *sorted((ROOT / "docs").glob("*.md")),
-    *sorted((ROOT / "conf").rglob("*.yaml")),
+    *(path for path in sorted((ROOT / "conf").rglob("*.yaml")) if path.parent.name != "language"),
 ]
 PAGES = [
-    *(path for path in TEXTS if not {"task", "facts", "limits", "editions"} & {path.parent.name}),
+    *(path for path in TEXTS if not {"task", "facts", "language", "limits", "editions"} & {path.parent.name}),
     *(path for path in sorted((ROOT / "examples").iterdir()) if path.suffix in (".py", ".md")),
     *sorted((ROOT / "integrations").glob("*/README.md")),
 ]
-"""Texts for users whose words are checked. Task files and facts are stored data."""
+"""Texts for users whose words are checked. Task files, facts and wordings of instructions are stored data."""
 PREPOSITIONS = (
     "about above across after against along among around at before behind below beneath beside between beyond by from "
     "in into of off on onto out over past through to toward towards under until up upon with within without when where"

@@ -190,7 +190,7 @@ def _row(plain: Any, path: Path) -> Evidence:
     """A row of a file.
 
     Raises:
-        ValueError, TypeError: it is none, or about another thing than the file.
+        ValueError, TypeError: it lacks fields, or names a kind or task that is not that of its file.
     """
     if not isinstance(plain, dict):
         raise ValueError("it is not a mapping")

@@ -358,9 +358,7 @@ def _values(row: DatasetRow, state: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _calibrations(
-    settings: RecordSettings, world: World, robot: str, held: Orientation
-) -> dict[str, dict[str, Any]]:
+def _calibrations(settings: RecordSettings, world: World, robot: str, held: Orientation) -> dict[str, dict[str, Any]]:
     """Calibration of each camera where it is supposed to stand, by the paper's name."""
     size, views = (settings.width, settings.height), cameras_of(robot)
     return {name: calibration(world, views[name], *size, held) for name in settings.camera_names}

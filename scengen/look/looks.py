@@ -42,7 +42,8 @@ class Look:
     def dress(self, spec: mujoco.MjSpec) -> None:
         """Give a scene with its visual geometry this look."""
         self.change(spec)
-        spec.add_text(name=MARK, data=self.name)
+        if self.name != PLAIN.name:
+            spec.add_text(name=MARK, data=self.name)
 
 
 def _leave(spec: mujoco.MjSpec) -> None:

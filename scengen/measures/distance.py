@@ -12,8 +12,8 @@ def distance(one: Picture, other: Picture) -> float:
     """Loss of structure plus difference of colour of two pictures; 0 if they are equal.
 
     Structure: 1 minus the mean structural similarity (SSIM) of the channels, with the Gaussian window of its authors.
-    Colour: mean CIE76 difference in CIELAB, of which 100 are black against white, over 100. SSIM alone hardly sees
-    another colour of the light; a difference of colours alone hardly sees an edge that is a pixel away.
+    Colour: mean CIE76 difference in CIELAB, of which 100 are black against white, over 100. SSIM alone
+    barely changes with the colour of the light; a difference of colours alone barely changes where an edge moves.
 
     Raises:
         BadConfig: scikit-image is not installed.

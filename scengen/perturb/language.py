@@ -46,7 +46,7 @@ def wordings(path: Path) -> dict[str, tuple[str, ...]]:
     """The texts in a file of a task.
 
     Raises:
-        BadConfig: it has other keys, another number of texts, a text twice, or one that is no text of a line.
+        BadConfig: it has other keys, another number of texts, equal texts, or a text of several lines.
     """
     node = read_yaml("texts", path)
     if not isinstance(node, Mapping) or {*node} != {*WORDINGS}:

@@ -13,6 +13,7 @@ from scengen import list_tasks, load_task
 from scengen.assets.prop import TABLE_TOP
 from scengen.envs.object_state import COMMON_BODIES, RESOLUTION, ObjectState, bodies_of
 from scengen.geometry import between
+from scengen.look.looks import PLAIN, ROOM
 from scengen.params import values, with_values
 from scengen.pool import Pool
 from scengen.samplers.split import ID
@@ -140,8 +141,8 @@ def test_the_box_of_a_body_reaches_to_its_outermost_solid_parts_in_its_own_axes(
     task = load_task("domino_single")
     one, state = task.draw(ID, 0, 0).scenario, state_of(task)
     sizes = {"slab.width": 0.08, "slab.thickness": 0.02, "slab.height": 0.2, "slab_yaw": 7.0, "count": 3}
-    for visual in (False, True):
-        world = World.load(rebuild(with_values(one, sizes)), task.embodiment, visual)
+    for look in (None, PLAIN, ROOM):
+        world = World.load(rebuild(with_values(one, sizes)), task.embodiment, look)
         read = state.read(world)
         low, high = (entries(state, read, f"slab_box_{corner}") for corner in ("low", "high"))
         np.testing.assert_allclose(sorted(high - low), [0.02, 0.08, 0.2], atol=1e-9)

@@ -157,7 +157,7 @@ WORK = (
     "scengen.validate.certify.certify",
     "scengen.runs.attempts.each",
     "scengen.evaluate.rollouts.each",
-    "scengen.evaluate.rollouts.unplayable",
+    "scengen.evaluate.scenarios.unplayable",
     "scengen.export.recording.unplayable",
     "scengen.validate.verify.pools.verify",
     "scengen.cli.commands.verify.verify",

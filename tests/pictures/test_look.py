@@ -20,7 +20,7 @@ from scengen.errors import BadConfig, UnknownName
 from scengen.evaluate.policies import make_policy
 from scengen.look.finish import OF_COLOURS, OF_PARTS
 from scengen.look.looks import LOOKS, PLAIN, ROOM, look_named, look_of, look_told
-from scengen.perturb.perturbation import arrays
+from scengen.perturb.drawn import arrays
 from scengen.pictures.render import Camera
 from scengen.pictures.views import things
 from scengen.pool import Pool

@@ -155,13 +155,15 @@ def test_robosuite_makes_both_arms_and_comes_to_the_same_verdict(rows):
 @pytest.mark.parametrize(("name", "solves"), [("idle", False), ("random", False), ("oracle", True)])
 def test_built_in_policies_act_for_both_arms(folder, rows, known, name, solves):
     play = PolicyPlayer(Evaluation(pool=str(folder), policy=name))
-    assert play([RolloutId("push_pair", str(folder), rows[0].id, 0)])[0]["success"] == solves
+    assert play([RolloutId("push_pair", "none", "clean", str(folder), rows[0].id, 0)])[0]["success"] == solves
 
 
 def test_a_policy_for_one_arm_is_told_so_in_one_line(folder, rows, known, monkeypatch):
     monkeypatch.setattr(policies.Idle, "act", lambda self, observation: np.zeros(7))
     with pytest.raises(BadPolicy, match="an action is 14 finite numbers"):
-        PolicyPlayer(Evaluation(pool=str(folder), policy="idle"))([RolloutId("push_pair", str(folder), rows[0].id, 0)])
+        PolicyPlayer(Evaluation(pool=str(folder), policy="idle"))(
+            [RolloutId("push_pair", "none", "clean", str(folder), rows[0].id, 0)]
+        )
 
 
 @pytest.mark.slow
