@@ -12,6 +12,7 @@ from typing import Any
 from ..compose import load_task
 from ..episode import Actions
 from ..errors import BadConfig, ScengenError, cut
+from ..look.looks import look_named
 from ..pool import Pool, kinds
 from ..pool.demonstrations import Demonstrations, is_demonstrations
 from ..pool.manifest import MANIFEST
@@ -197,9 +198,13 @@ class _Audit:
 
     def _other_run(self) -> Iterator[str]:
         """Settings of the table that are not those of the run, and scenarios that are left out without a reason."""
-        for name in ("policy", "version", "rules", "perturb_seed"):
+        for name in ("policy", "version", "rules", "perturb_seed", "look"):
             if self.of_run.get(name) != getattr(self.told, name):
                 yield f"{TABLE} says {name} = {getattr(self.told, name)!r:.60}, {RUN} has {self.of_run.get(name)!r:.60}"
+        look = look_named(self.told.look)
+        if (there := self.of_run.get("look_version")) != look.version:
+            earlier = f"{look.name} {cut(str(there), 20)}"
+            self.report.declined.append(f"pictures were taken in look {earlier}, this is {look}")
         for task, version in self.of_run["task_versions"].items():
             if text := load_task(task, self.options.search).other_version("played on", version):
                 self.report.declined.append(text)

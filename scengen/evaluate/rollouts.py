@@ -237,9 +237,9 @@ def _crashed(which: RolloutId, reason: str) -> dict[str, Any]:
 
 def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, Any]:
     """Everything on which the outcome of a rollout depends. More scenarios, rollouts or conditions continue a run."""
-    names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "rules")
+    names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "rules", "look")
     chosen = {"format": FORMAT, **{name: getattr(settings, name) for name in (*names, "perturb_seed")}}
-    chosen["look"] = str(look_named(settings.look))
+    chosen["look_version"] = look_named(settings.look).version
     if settings.remote:
         chosen["client"] = settings.remote.identity()
     if not settings.settle:

@@ -3,6 +3,7 @@
 import json
 import random
 import shutil
+from dataclasses import replace
 
 import helpers
 import pytest
@@ -13,6 +14,7 @@ from scengen.evaluate.audit_report import Options
 from scengen.evaluate.comparison import TABLE, Comparison
 from scengen.evaluate.lines import COLUMNS, RUN, EpisodeLine, picture_digest, read_lines, renewed, schema
 from scengen.evaluate.rollouts import order
+from scengen.look.looks import LOOKS
 from scengen.tasks.domino_single import DominoSingle
 
 REFERENCE = str(helpers.REFERENCE)
@@ -133,6 +135,11 @@ def test_results_are_sound_and_say_what_is_claimed(results):
     assert (bare.verdict, bare.rebuilt, bare.replayed) == ("sound", 12, 0)
     assert any(text.startswith("outcomes of 12 lines") for text in bare.claimed)
     assert not any(text.startswith("outcomes") for text in kept.claimed)
+
+
+def test_pictures_of_another_version_of_the_look_are_declined(results, monkeypatch):
+    monkeypatch.setattr("scengen.evaluate.audit.look_named", lambda name: replace(LOOKS[name], version=2))
+    assert verdict(results / "bare").declined == ["pictures were taken in look room 1, this is room 2"]
 
 
 @pytest.mark.parametrize("kind", FORGERIES)
