@@ -18,6 +18,7 @@ from ..perturb.effects import LANGUAGE, PICTURES
 from ..perturb.kinds import LEVELS, Kind, affects, stream_kind
 from ..perturb.language import Words, leaks, other_words
 from ..perturb.perturbation import Perturbation
+from ..pictures.perturbed import changed_by
 from ..pictures.render import Camera, Picture
 from ..pictures.views import things
 from ..scenario import Scenario
@@ -140,9 +141,7 @@ class Stage:
         drawn = Perturbation(((kind.name, level),)).of(
             self.scenario.id, bodies=self.world.free_bodies, words=self.words
         )
-        with drawn.while_applied(self.world.model) as changed:
-            if any(name.startswith("tex_") for name in changed):
-                self.eye.refresh()
+        with changed_by(drawn, self.eye) as changed:
             neutral = all(name.startswith(SEEN) or self._is_spare(name, rows) for name, rows in changed.items())
             if kind.effect.reads == LANGUAGE:
                 return self._text_proof(drawn.instruction or "", not changed)
@@ -163,10 +162,7 @@ class Stage:
                     hidden |= self._lost(self.shown[number], self._counts(self._uncovered(drawn, ids)))
             if level == LEVELS and changed:
                 neutral = neutral and self._played()[1] == self.digest
-            crossed = self._is_crossed()
-        if any(name.startswith("tex_") for name in changed):
-            self.eye.refresh()
-        return Proof(neutral, changes, tuple(sorted(hidden)), is_crossed=crossed)
+            return Proof(neutral, changes, tuple(sorted(hidden)), is_crossed=self._is_crossed())
 
     def _is_spare(self, name: str, rows: NDArray[np.int64]) -> bool:
         """Whether only spare geoms differ in an array."""

@@ -41,7 +41,7 @@ class Perturbation:
         for one in (text or "").split("+") if text not in (None, "", NONE) else ():
             name, at, level = one.strip().partition("@")
             kind_of(name)
-            if not at or not level.isdigit() or not 1 <= int(level) <= LEVELS:
+            if not at or not level.isdecimal() or not 1 <= int(level) <= LEVELS:
                 raise BadConfig(f"perturb = {text}; give {name} a level from 1 to {LEVELS}, such as {name}@3")
             if name in dict(parts):
                 raise BadConfig(f"perturb = {text}; {name} is in it twice: give each kind once")

@@ -1,12 +1,14 @@
 """A sheet of perturbations: the start of a scenario, clean and at every level of some kinds."""
 
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..look.looks import Look
 from ..perturb.distractors import with_spares
+from ..perturb.drawn import Drawn
 from ..perturb.kinds import LEVELS, Kind, affects
 from ..perturb.perturbation import Perturbation
 from ..pool import PoolRow
@@ -14,6 +16,18 @@ from ..scenario import Scenario
 from ..validate.playable import stored_world
 from .film import Progress, captioned
 from .render import Camera, Picture
+
+
+@contextmanager
+def changed_by(drawn: Drawn, eye: Camera) -> Iterator[Mapping[str, NDArray[np.int64]]]:
+    """Change the scene of a camera during a `with` statement, its textures included, as `Drawn.while_applied` does."""
+    with drawn.while_applied(eye.world.model) as changed:
+        is_printed = any(name.startswith("tex_") for name in changed)
+        if is_printed:
+            eye.refresh()
+        yield changed
+    if is_printed:
+        eye.refresh()
 
 
 def shows(kind: Kind, camera: str, look: Look) -> bool:
@@ -51,7 +65,7 @@ def sheet(
         clean = taken()
         for perturbation in levels:
             drawn = perturbation.of(row.id, seed)
-            with drawn.while_applied(world.model):
+            with changed_by(drawn, eye):
                 picture = drawn.on_picture(taken(), camera, 0)
             pictures.append(captioned(picture, str(perturbation)))
             progress(len(pictures), len(levels))

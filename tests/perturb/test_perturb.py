@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import REFERENCE, pictures_are_possible
+from PIL import Image
 
 from scengen import cli
 from scengen.compose import load_task
@@ -46,6 +47,7 @@ def test_every_effect_has_a_file_with_five_growing_strengths():
         ("nose@3", UnknownName, r"no perturbation named 'nose' \(did you mean 'noise'\?\)"),
         ("noise", BadConfig, "give noise a level from 1 to 5, such as noise@3"),
         ("noise@6", BadConfig, "give noise a level from 1 to 5"),
+        ("noise@²", BadConfig, "give noise a level from 1 to 5"),
         ("noise@1+noise@2", BadConfig, "noise is in it twice"),
         ("noise@1+", UnknownName, "no perturbation named ''"),
     ],
@@ -314,6 +316,9 @@ def test_a_sheet_shows_each_level_beside_the_clean_picture(tmp_path, capsys):
     words = ["show", "perturb", f"pool={REFERENCE}", "id=8ed4", "perturb=blur+shadow", f"to={target}", "size=32"]
     assert cli.run(words) == 0 and target.stat().st_size > 1000
     assert "blur: 1.9" in capsys.readouterr().out
+    assert cli.run([*words, "perturb=table_texture"]) == 0
+    cells = np.hsplit(np.asarray(Image.open(target).convert("RGB"), float)[-12:], 6)
+    assert np.abs(cells[5] - cells[0]).mean() > 5, "textures are uploaded again"
     assert cli.run([*words, "perturb=wrist_camera"]) == 2
     assert "affects wrist cameras" in capsys.readouterr().err
     assert cli.run([*words, "perturb=foreign"]) == 0 and "foreign@1: Kipp den ersten" in capsys.readouterr().out
