@@ -391,10 +391,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self.close()
             self._world = stored_world(row, self.perturbation.dressed(self.look) if self._needs_pictures else None)
             self._scenario = self.task.scenario(row.params)
-            senses = self.perturbation.senses(
+            self.drawn = self.perturbation.senses(
                 self._world.model, row.id, row.task, row.instruction, self._perturb_seed, self._search
-            )
-            self.drawn = senses.drawn
+            ).drawn
         self._row = row
         self._senses = Senses(self.drawn)
         self._played: list[NDArray[np.float32]] = []

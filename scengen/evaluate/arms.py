@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadConfig, UnknownName
-from ..perturb.language import Words
+from ..errors import UnknownName
+from ..perturb.language import TEXTS, Words, worded
 from ..pool import PoolRow
 from ..samplers.keyed import unit
 from ..samplers.task_files import about, tasks
@@ -68,12 +68,8 @@ def reworded_instruction(row: PoolRow, search: Sequence[str] = ()) -> str:
     Raises:
         BadConfig: the task has none.
     """
-    words = Words.of(row.task, row.instruction, search)
-    if not words.wordings:
-        why = f"arms = reworded, but {row.task} has no conf/language/{row.task}.yaml; write it, or leave the arm out"
-        raise BadConfig(why)
-    texts = words.wordings["reworded"]
-    return texts[int(len(texts) * unit("reworded instruction", row.id))]
+    number = 1 + int(TEXTS * unit("reworded instruction", row.id))
+    return worded("reworded", number, Words.of(row.task, row.instruction, search))
 
 
 ARMS: Mapping[str, Arm] = {

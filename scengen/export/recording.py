@@ -384,14 +384,8 @@ def _camera(
     held.check_size(settings.width, settings.height)
     camera = Camera(world, settings.width, settings.height)
     stack.callback(camera.close)
-
-    def pictures() -> dict[str, Picture]:
-        taken = {name: held.apply(camera.take(views[name])) for name in settings.camera_names}
-        if not senses.drawn.values:
-            return taken
-        return {name: senses.picture(views[name], world.time, one.copy()) for name, one in taken.items()}
-
-    return pictures
+    shown = {name: views[name] for name in settings.camera_names}
+    return lambda: {name: senses.picture(v, world.time, held.apply(camera.take(v))) for name, v in shown.items()}
 
 
 def _features(settings: RecordSettings, robot: str, streams: Mapping[str, Stream]) -> dict[str, Feature]:

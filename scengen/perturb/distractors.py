@@ -73,11 +73,9 @@ def put(model: mujoco.MjModel, number: int, key: int) -> None:
         reach = float(np.linalg.norm(half[:2]))
         if any(area.distance(place) < reach + area.margin for area in taken):
             continue
-        spare = free.pop(0)
-        if shape == mujoco.mjtGeom.mjGEOM_CYLINDER:
-            half = np.array([half[0], half[1], 0.0])
-        height = half[1] if shape == mujoco.mjtGeom.mjGEOM_CYLINDER else half[2]
-        model.geom_type[spare], model.geom_size[spare] = shape, half
+        spare, is_round = free.pop(0), shape == mujoco.mjtGeom.mjGEOM_CYLINDER  # its size: radius, half the height
+        height = half[1] if is_round else half[2]
+        model.geom_type[spare], model.geom_size[spare] = shape, [*half[:2], 0.0] if is_round else half
         model.geom_pos[spare], model.geom_rgba[spare] = [*place, TABLE_TOP + height], [*colour, 1.0]
         model.geom_quat[spare] = [np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
         taken.append(_Area(place, half[:2], MARGIN))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..control.loop import Loop
 from ..samplers.keyed import unit
-from .effects import OBJECTS, Effect, Picture, Reading, Values
+from .effects import OBJECTS, Effect, Picture, Reading, Values, number_in
 from .kinds import affects, kinds, stream_kind
 from .language import WORDINGS, Words
 
@@ -61,10 +61,8 @@ class Drawn:
     @cached_property
     def delay(self) -> float:
         """Age of the pictures that are perceived [s]."""
-        return max(
-            (float(np.asarray(self.values[n]["seconds"])) for n, each in self.effects.items() if each.is_late),
-            default=0.0,
-        )
+        late = (self.values[name] for name, effect in self.effects.items() if effect.is_late)
+        return max((number_in(values, "seconds") for values in late), default=0.0)
 
     def on_model(self, model: mujoco.MjModel) -> None:
         """Change lights, colours and cameras of a compiled scene, once."""
@@ -154,8 +152,10 @@ def _period(time: float) -> int:
 
 def _unequal(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.int64]:
     """Numbers of the rows that have not the same bits."""
-    differs = one.view(np.uint8) != other.view(np.uint8) if one.size else np.zeros(0, bool)
-    return np.flatnonzero(differs.reshape(len(one), -1).any(axis=1)) if one.size else np.zeros(0, np.int64)
+    if not one.size:
+        return np.zeros(0, np.int64)
+    differs = one.view(np.uint8) != other.view(np.uint8)
+    return np.flatnonzero(differs.reshape(len(one), -1).any(axis=1))
 
 
 def arrays(model: mujoco.MjModel) -> dict[str, NDArray[np.generic]]:

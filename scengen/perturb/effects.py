@@ -83,6 +83,11 @@ class Effect:
     """Whether pictures arrive `seconds` late."""
 
 
+def number_in(values: Values, name: str) -> float:
+    """A drawn value that is one number."""
+    return float(np.asarray(values[name]))
+
+
 def _sign(rng: Random) -> float:
     return 1.0 if rng.random() < 0.5 else -1.0
 
@@ -143,7 +148,7 @@ def _tint(strength: float, rng: Random) -> Values:
 
 def _contrast(model: mujoco.MjModel, values: Values) -> None:
     """Move light from everywhere, that of fills included, to the light that casts shadows, or back."""
-    shift = float(np.asarray(values["shift"]))
+    shift = number_in(values, "shift")
     model.light_diffuse[~model.light_castshadow.astype(bool)] *= 1.0 - shift
     model.vis.headlight.ambient[:] = np.clip(model.vis.headlight.ambient * (1.0 - shift), 0.0, 1.0)
     model.vis.headlight.diffuse[:] = np.clip(model.vis.headlight.diffuse * (1.0 - shift), 0.0, 1.0)
@@ -158,7 +163,7 @@ def _colour(strength: float, rng: Random) -> Values:
 
 
 def _blended(rgb: NDArray[np.float64], values: Values) -> NDArray[np.float64]:
-    share = float(np.asarray(values["share"]))
+    share = number_in(values, "share")
     return (1.0 - share) * rgb + share * np.asarray(values["colour"], float)
 
 
@@ -187,10 +192,10 @@ def _print_table(model: mujoco.MjModel, values: Values) -> None:
     shape = (model.tex_height[texture], model.tex_width[texture], model.tex_nchannel[texture])
     start = model.tex_adr[texture]
     data = model.tex_data[start : start + int(np.prod(shape))]
-    cells, kind = (round(float(np.asarray(values[name]))) for name in ("cells", "kind"))
+    cells, kind = (round(number_in(values, name)) for name in ("cells", "kind"))
     shade = PATTERNS[kind](*(np.indices(shape[:2]) * cells / shape[0]))[..., None]
     pattern = 255.0 * (shade + (1.0 - shade) * np.asarray(values["colour"], float))
-    share = float(np.asarray(values["share"]))
+    share = number_in(values, "share")
     data[:] = ((1.0 - share) * data.reshape(shape) + share * pattern).round().astype(np.uint8).ravel()
 
 
@@ -203,7 +208,7 @@ PATTERNS: Sequence[Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[
 
 
 def _show_things(model: mujoco.MjModel, values: Values) -> None:
-    number, key = (round(float(np.asarray(values[name]))) for name in ("number", "key"))
+    number, key = (round(number_in(values, name)) for name in ("number", "key"))
     put(model, number, key)
 
 
@@ -225,7 +230,7 @@ def _move_cameras(which: str) -> Callable[[mujoco.MjModel, Values], None]:
                 mujoco.mju_mat2Quat(quat, rotation(np.radians(np.asarray(values["turn"], float))).ravel())
                 mujoco.mju_mulQuat(model.cam_quat[number], model.cam_quat[number].copy(), quat)
             if "fovy" in values:
-                model.cam_fovy[number] *= float(np.asarray(values["fovy"]))
+                model.cam_fovy[number] *= number_in(values, "fovy")
 
     return change
 
@@ -251,29 +256,29 @@ def _knock(strength: float, rng: Random) -> Values:
 
 
 def _grain(picture: Picture, values: Values, rng: Random) -> Picture:
-    noisy = picture + rng.normal(0.0, float(np.asarray(values["sigma"])), picture.shape)
+    noisy = picture + rng.normal(0.0, number_in(values, "sigma"), picture.shape)
     return np.clip(noisy.round(), 0, 255).astype(np.uint8)
 
 
 def _blur(picture: Picture, values: Values, rng: Random) -> Picture:
-    sigma = float(np.asarray(values["sigma"])) * picture.shape[0] / 256
+    sigma = number_in(values, "sigma") * picture.shape[0] / 256
     return np.clip(gaussian_filter(picture.astype(float), (sigma, sigma, 0.0)).round(), 0, 255).astype(np.uint8)
 
 
 def _compress(picture: Picture, values: Values, rng: Random) -> Picture:
     buffer = io.BytesIO()
-    Image.fromarray(picture).save(buffer, "jpeg", quality=max(1, round(100.0 - float(np.asarray(values["loss"])))))
+    Image.fromarray(picture).save(buffer, "jpeg", quality=max(1, round(100.0 - number_in(values, "loss"))))
     return np.asarray(Image.open(buffer))
 
 
 def _expose(picture: Picture, values: Values, rng: Random) -> Picture:
-    return np.clip((picture * float(np.asarray(values["factor"]))).round(), 0, 255).astype(np.uint8)
+    return np.clip((picture * number_in(values, "factor")).round(), 0, 255).astype(np.uint8)
 
 
 def _cover(picture: Picture, values: Values, rng: Random) -> Picture:
     """A dark square, which stays in its place during an episode."""
     height, width, _ = picture.shape
-    edge = float(np.asarray(values["edge"]))
+    edge = number_in(values, "edge")
     at = np.asarray(values["at"], float) * (1.0 - edge)
     rows, columns = (slice(round(a * n), round((a + edge) * n)) for a, n in zip(at, (height, width), strict=True))
     covered = picture.copy()
@@ -282,7 +287,7 @@ def _cover(picture: Picture, values: Values, rng: Random) -> Picture:
 
 
 def _drop(picture: Picture, values: Values, rng: Random) -> Picture:
-    return np.zeros_like(picture) if rng.random() < float(np.asarray(values["share"])) else picture
+    return np.zeros_like(picture) if rng.random() < number_in(values, "share") else picture
 
 
 def _value(name: str) -> Callable[[float, Random], Values]:
@@ -310,13 +315,13 @@ def _scale_of(entry: str) -> float:
 
 
 def _noise(entries: Sequence[str], reading: Reading, values: Values, rng: Random) -> Reading:
-    return _erring(entries, reading, rng.normal(0.0, float(np.asarray(values["sigma"])), reading.shape))
+    return _erring(entries, reading, rng.normal(0.0, number_in(values, "sigma"), reading.shape))
 
 
 def _bias(entries: Sequence[str], reading: Reading, values: Values, rng: Random) -> Reading:
     """The same error throughout an episode: an entry's sign follows from its place and the values alone."""
     signs = np.random.default_rng(int(np.asarray(values["key"]))).choice([-1.0, 1.0], reading.shape)
-    return _erring(entries, reading, signs * float(np.asarray(values["bias"])))
+    return _erring(entries, reading, signs * number_in(values, "bias"))
 
 
 def _erring(entries: Sequence[str], reading: Reading, error: Reading) -> Reading:
@@ -335,7 +340,7 @@ def _wording(kind: str) -> Effect:
     """Another text in place of the instruction."""
 
     def change(text: str, values: Values, words: Words) -> str:
-        return worded(kind, round(float(np.asarray(values["text"]))), words)
+        return worded(kind, round(number_in(values, "text")), words)
 
     return Effect(_value("text"), LANGUAGE, on_text=change, varies=False)
 
@@ -344,7 +349,7 @@ def _clauses(kind: str) -> Effect:
     """Sentences around the instruction."""
 
     def change(text: str, values: Values, words: Words) -> str:
-        number, key = (round(float(np.asarray(values[name]))) for name in ("clauses", "key"))
+        number, key = (round(number_in(values, name)) for name in ("clauses", "key"))
         return extended(kind, number, key, text)
 
     return Effect(

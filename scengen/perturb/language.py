@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,8 @@ MAX_TEXT = 400
 class Words:
     """The instruction of a task and what may be said instead."""
 
+    task: str
+    """Name of the task."""
     instruction: str
     wordings: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
     """Texts of each kind in `WORDINGS`."""
@@ -39,10 +42,11 @@ class Words:
             BadConfig: the file is damaged.
         """
         path = task_files.file_of_group(task, "language", search)
-        return cls(instruction, wordings(path) if path else {})
+        return cls(task, instruction, wordings(path) if path else {})
 
 
-def wordings(path: Path) -> dict[str, tuple[str, ...]]:
+@cache
+def wordings(path: Path) -> Mapping[str, Sequence[str]]:
     """The texts in a file of a task.
 
     Raises:
@@ -80,9 +84,8 @@ def worded(kind: str, number: int, words: Words) -> str:
         BadConfig: the task has none.
     """
     if not words.wordings:
-        raise BadConfig(
-            f"{kind}: the task has no other wordings; write {', '.join(WORDINGS)} to conf/language/TASK.yaml"
-        )
+        file = f"conf/language/{words.task}.yaml"
+        raise BadConfig(f"{kind}: {words.task} has no other wordings; write {', '.join(WORDINGS)} to {file}")
     return words.wordings[kind][number - 1]
 
 
@@ -104,6 +107,7 @@ def extended(kind: str, number: int, key: int, text: str) -> str:
     return " ".join([joined, *others[: number - 1]])
 
 
+@cache
 def clauses(kind: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Beginnings and sentences that a kind adds to any instruction, from `conf/language/clauses.yaml`."""
     path = task_files.conf_dir() / "language" / "clauses.yaml"

@@ -135,8 +135,6 @@ class Recorded:
 
 def _perceived(name: str, stream: Stream, senses: Senses) -> Callable[[World], NDArray[Any]]:
     """Function that reads a stream from a world as it is perceived."""
-    if not senses.drawn.values:
-        return stream.read
     known = NAME if name == ENVIRONMENT else name
     return lambda world: senses.reading(known, stream.entries(known), world.time, stream.read(world))
 
@@ -290,14 +288,12 @@ class _Films:
     def compare(self, row: int) -> None:
         """Render the pictures of a row again, if it is one of those to be compared."""
         for key in self._differences:
-            probe, frozen, drawn = self._probes.get((key, row)), self._frozen.get(key), self._senses.drawn
-            if probe is None and (frozen is None or row not in frozen.frames) and not drawn.delay:
+            probe, frozen = self._probes.get((key, row)), self._frozen.get(key)
+            if probe is None and (frozen is None or row not in frozen.frames) and not self._senses.drawn.delay:
                 continue
             assert self._camera is not None
             view = self._views[key.removeprefix(IMAGES_PREFIX)]
-            picture = self._held.apply(self._camera.take(view)).copy()
-            if drawn.values:
-                picture = self._senses.picture(view, self._world.time, picture)
+            picture = self._senses.picture(view, self._world.time, self._held.apply(self._camera.take(view)))
             if probe:
                 self._differences[key].append(probe.differences(picture))
             if frozen and row in frozen.frames:
