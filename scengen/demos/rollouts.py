@@ -118,7 +118,7 @@ class _PoolKeeper:
     def add(self, which: RolloutId, actions: Actions) -> None:
         """Play the actions again, and store what they do."""
         row = self.pool.at(self._places[which.scenario])
-        scenario = self.task.scenario(row.params)
+        scenario = self.task.scenario(row.params, row.split)
         rules = check_rules(self.config.rules)
         played = replay(scenario, stored_world(row), actions, row.horizon, self.config.settle, rules=rules)
         columns = {name: value for name, value in vars(row).items() if name != "certificate"}

@@ -167,7 +167,7 @@ class RobosuiteEnv(ManipulationEnv):
     def step(self, action: NDArray[np.float64]) -> tuple[Observations, float, bool, dict[str, Any]]:
         """Step as robosuite does, after the action filter, if there is one."""
         self._begin_episode()  # robosuite allows a step without a reset
-        return super().step(self.world.filter(action) if self.action_filter else action)
+        return super().step(self.world.received(action) if self.action_filter else action)
 
     @property
     def action_spec(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -250,6 +250,11 @@ class RobosuiteEnv(ManipulationEnv):
         super()._setup_references()
         model, data = self.sim.model._model, self.sim.data._data
         self.world = World(model, data, Loop(model, data), len(self.robots) - self._controlled_arms)
+        if self.world.loop.impairment:
+            raise BadConfig(
+                f"{self.row.name} is posed under conditions of control, which robosuite's own controller would ignore; "
+                "play it in the Gymnasium environment"
+            )
 
     def _setup_observables(self) -> Observations:
         observables = super()._setup_observables()
