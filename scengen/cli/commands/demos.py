@@ -58,7 +58,9 @@ def command(arguments: Arguments) -> int:
     folder, times = Counter(run.settings.to for run in runs).most_common(1)[0]
     if times > 1:
         others = [name for name in requested[0].swept if name not in ("task", "split")]
-        remedy = f"repeat the command for each value of {others[0]}, with another to=" if others else "give each value once"
+        remedy = (
+            f"repeat the command for each value of {others[0]}, with another to=" if others else "give each value once"
+        )
         raise BadConfig(f"{times} of the combinations would be written to {folder}; {remedy}")
     statuses = [OK if run().made == run.settings.n else FAILED for run in runs]
     return max(statuses)
