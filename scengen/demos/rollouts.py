@@ -5,11 +5,11 @@ from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from ..episode import Actions, check_rules
 from ..errors import BadConfig
-from ..evaluate.lines import FOLDER, kept_folder
+from ..evaluate.lines import FOLDER, condition_of, kept_folder
 from ..evaluate.settings import EvaluateSettings, RolloutId
 from ..pool import Pool
 from ..pool.demonstrations import DEMONSTRATIONS, POLICY, DemonstrationConfig
@@ -84,7 +84,11 @@ class _PoolKeeper:
 
     def __init__(self, pool: Pool, task: Task, settings: EvaluateSettings, folder: Path):
         self.pool, self.task, self.settings, self.folder = pool, task, settings, folder
-        about = pool.manifest.config
+        about, condition = pool.manifest.config, condition_of(folder)
+        self.driver: dict[str, Any] = {"policy": settings.name}
+        """Entries of the manifest about the policy."""
+        if condition:
+            self.driver |= {"condition": str(condition), "perturb_seed": settings.perturb_seed}
         self.config = DemonstrationConfig(
             task=about.task,
             split=about.split,
@@ -101,8 +105,8 @@ class _PoolKeeper:
     @cached_property
     def journal(self) -> Journal:
         """The journal, opened by the first rollout."""
-        names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "client")
-        identity = {name: getattr(self.settings, name) for name in (*names, "perturb", "perturb_seed")}
+        names = ("version", "observations", "width", "height", "action_filter", "action_repeat", "client")
+        identity = {**self.driver, **{name: getattr(self.settings, name) for name in names}}
         made = {"pool": self.pool.sha256, "config": asdict(self.config), **identity, **made_with(self.task)}
         return Journal(self.folder, made, DEMONSTRATIONS, DemonstrationRow, "to")
 
@@ -139,6 +143,4 @@ class _PoolKeeper:
         """Write the rollouts that were kept."""
         records = self.journal.records()
         with reported_write_errors(self.folder):
-            return finish(
-                self.folder, self.task, self.config, len(records), records, self.journal, policy=self.settings.name
-            )
+            return finish(self.folder, self.task, self.config, len(records), records, self.journal, **self.driver)

@@ -371,7 +371,8 @@ class _Verification:
 def _author(manifest: DemonstrationManifest, oracle: bool) -> list[str]:
     """Claims about the driver of the robot."""
     if manifest.source == POLICY:
-        return [f"policy {manifest.policy!a} drove the robot", "no rollout of it was left out"]
+        under = f" under {manifest.condition!a}, seed {manifest.perturb_seed}" if manifest.condition else ""
+        return [f"policy {manifest.policy!a} drove the robot{under}", "no rollout of it was left out"]
     if manifest.source == TELEOP:
         return [f"operator {manifest.operator} drove the robot", "no take was left out"]
     return [] if oracle else ["the oracle played the actions (level=full plays it again)"]
