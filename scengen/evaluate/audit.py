@@ -113,7 +113,7 @@ class _Audit:
         self.of_run = StoredRun.of(self.identity, self.folder / RUN)
         self.lines, self.readable = read_lines(self.folder / kinds.EPISODES), False
         self.report, self.sampled = ResultsReport(str(self.folder), len(self.lines)), 0
-        self._actions: dict[Path, dict[tuple[str, int], Actions]] = {}
+        self._actions: dict[Path, dict[tuple[int, int], Actions]] = {}
         given = [Pool.open(folder).check() for folder in options.pools]
         named = {**self.of_run.pools, **stored.benign}
         self.pools = {name: _pool_here(name, sha256, given) for name, sha256 in named.items()}
@@ -256,20 +256,22 @@ class _Audit:
     def _kept(self, number: int) -> Actions | None:
         """The actions of a line that were kept."""
         which = id_of(self.lines[number])
-        actions = self._kept_of(which).get((which.scenario, which.rollout))
+        actions = self._kept_of(which).get((self.lines[number]["index"], which.rollout))
         if actions is None and self.of_run.keep:
             self._tell([(number, f"has no kept actions in {kept_folder(self.folder, which)}")])
         return actions
 
-    def _kept_of(self, which: RolloutId) -> Mapping[tuple[str, int], Actions]:
-        """The kept actions of the folder of a rollout, by scenario and number."""
+    def _kept_of(self, which: RolloutId) -> Mapping[tuple[int, int], Actions]:
+        """The kept actions of the folder of a rollout, by the index of the scenario and the number of the rollout.
+
+        Under conditions of control the scenario has another id there."""
         folder = kept_folder(self.folder, which)
         if folder not in self._actions:
             found = Demonstrations.open(folder) if is_demonstrations(folder) else None
             rows = [] if found is None else [*found.attempts()]
             if found is not None:
                 self._tell((None, f"{folder} {text}") for text in self._of_others(found, which))
-            self._actions[folder] = {(row.id, row.run): row.witness for row in rows}
+            self._actions[folder] = {(row.index, row.run): row.witness for row in rows}
         return self._actions[folder]
 
     def _of_others(self, found: Demonstrations, which: RolloutId) -> Iterator[str]:
@@ -285,7 +287,7 @@ class _Audit:
         """Lines of crashes whose episode was played to its end: its actions were kept."""
         for number, line in enumerate(self.lines):
             which = id_of(line)
-            if line["crashed"] and (which.scenario, which.rollout) in self._kept_of(which):
+            if line["crashed"] and (line["index"], which.rollout) in self._kept_of(which):
                 yield number, "says that the policy crashed, but the actions of a whole episode were kept"
 
     # --- what is not known --------------------------------------------------------------------
