@@ -1,6 +1,6 @@
 """What hinders the control of a robot: another start, late, noisy or lost actions, a soft controller, a load.
 
-It stands in custom numbers of the scene, so that whoever plays the scene plays it under the same conditions.
+It stands in custom numbers of the scene, so that every program that plays the scene plays it so.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Conditions of control: kinds of parts of a split that every task has, beside its axes.
+"""Conditions of control, which are parts of a split as axes are, and which every task has.
 
 `action_delay@3` is the third level of one, `wide_gaps@3+payload@1` goes with an axis. Strengths are in
 `conf/perturbations`, of which these kinds are those that change what happens and not only what is perceived. Values
