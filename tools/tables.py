@@ -185,10 +185,17 @@ def control() -> dict[str, str]:
     lines = []
     for task in list_tasks():
         row = next(iter(ledger.newest("control", task)), None)
-        counts = [row.value[kind]["certified"] if row else [] for kind in KINDS]
-        cells = [" ".join(map(str, each)) or ledger.not_measured(task) for each in counts]
+        cells = [_borne(row.value[kind]) if row else ledger.not_measured(task) for kind in KINDS]
         lines.append([link(task), f"{row.n}{ledger.mark(row)}" if row else NONE, *cells])
     return {"control": table(("task", "scenarios", *(f"`{kind}`" for kind in KINDS)), lines)}
+
+
+def _borne(figures: Mapping[str, Any]) -> str:
+    """The cell of a kind: certified scenarios by level, with a star where solutions end in the usual bits."""
+    return " ".join(
+        f"{count}{'*' if level in figures['without_effect'] else ''}"
+        for level, count in enumerate(figures["certified"], 1)
+    )
 
 
 def _drifted(versions: Sequence[str], rows: Sequence[Evidence]) -> str:

@@ -19,7 +19,7 @@ from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
 from ..sim.embodiment import JAW, action_size
 from ..sim.world import World
-from .impaired import impaired
+from .impaired import held, impaired
 from .rebuilt import posed
 from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
 from .settings import QUICK, CertifySettings
@@ -163,9 +163,13 @@ class Trial:
         return {"overlap": self.settings.overlap}, {"deepest": depth}, reason
 
     def _rest(self) -> "Finding":
-        """Whether bodies move without action. The goal is evaluated at the start, and at the end or before an event."""
+        """Whether bodies move without action. The goal is evaluated at the start, and at the end or before an event.
+
+        Under conditions of control an arm may move without action, and what it holds with it.
+        """
         world, limits = self.world, self.settings.rest
-        bodies = [b for b in world.free_bodies if b not in self.scenario.MOVING]
+        moving = (*self.scenario.MOVING, held(world) if self.scenario.conditions else "")
+        bodies = [b for b in world.free_bodies if b not in moving]
 
         def state() -> tuple[dict[str, tuple[Vec3, Mat3]], bool]:
             return {b: (world.com(b), world.rot(b)) for b in bodies}, self.scenario.success(world)

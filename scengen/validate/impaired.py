@@ -47,19 +47,19 @@ def impairment_in(text: str, conditions: Conditions, scenario: str, seed: int = 
 def impaired(text: str, impairment: Impairment, embodiment: str) -> str:
     """The text of a scene under an impairment. What a jaw holds at the start moves with the hand."""
     scene = from_mjcf(text)
-    if impairment.start and (held := _held(world := World.load(text, embodiment))):
+    if impairment.start and (found := held(world := World.load(text, embodiment))):
         impairment.write(moved := from_mjcf(text))
         there = World.load(scene_text.emit(moved)[0], embodiment)
         turn = there.arms[0].hand_rot @ world.arms[0].hand_rot.T
-        body, quat = scene.body(held), np.empty(4)
-        body.pos = there.arms[0].hand + turn @ (world.pos(held) - world.arms[0].hand)
-        mujoco.mju_mat2Quat(quat, (turn @ world.rot(held)).ravel())
+        body, quat = scene.body(found), np.empty(4)
+        body.pos = there.arms[0].hand + turn @ (world.pos(found) - world.arms[0].hand)
+        mujoco.mju_mat2Quat(quat, (turn @ world.rot(found)).ravel())
         body.quat = quat
     impairment.write(scene)
     return scene_text.emit(scene)[0]
 
 
-def _held(world: World) -> str:
+def held(world: World) -> str:
     """The free body between the fingers of the first arm at the start; empty if there is none."""
     if width_in_hand(world.model) is None:
         return ""

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import helpers
 import pytest
-from scengen.evaluate.stored import stored_results
 
 from scengen import cli
 from scengen.evaluate.audit import _Audit, audit
@@ -15,6 +14,7 @@ from scengen.evaluate.audit_report import Options
 from scengen.evaluate.comparison import TABLE, Comparison
 from scengen.evaluate.lines import COLUMNS, RUN, EpisodeLine, picture_digest, read_lines, renewed, schema
 from scengen.evaluate.rollouts import order
+from scengen.evaluate.stored import stored_results
 from scengen.look.looks import LOOKS
 from scengen.tasks.domino_single import DominoSingle
 
