@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -210,7 +210,14 @@ def _row(plain: Any, path: Path) -> Evidence:
         figure = row.value.get(name)
         if type(figure) not in (int, float) or figure < 0:
             raise ValueError(f"value has {name} = {cut(repr(figure))}")
-    return row
+    return replace(row, value=_Entries(row.value), made_with=_Entries(row.made_with))
+
+
+class _Entries(dict[str, Any]):
+    """Entries of a row that was read: one that is read and missing is a fault of the file."""
+
+    def __missing__(self, name: str) -> Any:
+        raise BadConfig(f"a row of the ledger lacks {name}, it has {cut(', '.join(self))}; restore records/")
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from scengen.cli import run
 from scengen.errors import BadConfig
 from scengen.evidence import ledger, measuring
 from scengen.evidence.ledger import KINDS, Evidence
+from scengen.measures import figures
 from scengen.measures.measurement import Result, Row
 from scengen.measures.policies import MIXED
 from scengen.measures.scenarios import Certified
@@ -282,6 +283,15 @@ def test_rows_on_other_draws_are_not_told_as_measured(empty, capsys):
     told = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert " certified id 3 8 of 9: diagonal, " in told and "; on other draws: diagonal, nowhere" in told
     assert f"claimed, and not checked: the figures of {empty}" in told
+
+
+def test_figures_that_a_row_lacks_are_named(empty):
+    ledger.write(replace(ROW, kind="belief", split="diagonal"))
+    with pytest.raises(BadConfig, match="a row of the ledger lacks baselines, it has solved"):
+        figures.baselines(TASK)
+    ledger.write(replace(ROW, kind="belief", split="diagonal", value={"baselines": []}))
+    ledger.write(replace(ROW, kind="belief", split="an_axis_of_an_earlier_version"))
+    assert not any(figures.baselines(TASK).values())
 
 
 def test_two_rows_of_the_same_place_and_files_that_are_none_are_refused(empty):
