@@ -49,7 +49,7 @@ def test_every_file_is_about_a_task_and_every_row_is_whole(kind):
             assert row.split in ("", *splits)
             assert type(row.version) is int and 1 <= row.version <= version
             assert type(row.n) is int and row.n >= 1
-            assert type(row.value) is dict and row.value and type(row.made_with) is dict and row.made_with
+            assert isinstance(row.value, dict) and row.value and isinstance(row.made_with, dict) and row.made_with
 
 
 @pytest.mark.parametrize("name", sorted({row.task for row in ROWS}))
