@@ -61,9 +61,14 @@ class Perturbation:
         """Whether a part changes the instruction."""
         return any(kinds()[name].effect.reads == LANGUAGE for name, _ in self.parts)
 
+    @property
+    def shows_spares(self) -> bool:
+        """Whether a part shows spare geoms."""
+        return any(kinds()[name].effect.is_added for name, _ in self.parts)
+
     def dressed(self, look: Look) -> Look:
         """A look of a scene that is to be perturbed: with spare geoms if a part shows them."""
-        return with_spares(look) if any(kinds()[name].effect.is_added for name, _ in self.parts) else look
+        return with_spares(look) if self.shows_spares else look
 
     def check(self, streams: Sequence[str], cameras: Sequence[str], look: Look = ROOM) -> None:
         """Raise `BadConfig` if a part affects nothing that is observed. The instruction can always be read.
