@@ -1,5 +1,5 @@
-"""inspect-robots and vla-eval get what the Gymnasium environment gives under the same perturbation. Needs both packages,
-as `make integrations` installs them."""
+"""inspect-robots and vla-eval get what the Gymnasium environment gives under the same perturbation. Both packages are
+needed, as `make integrations` installs them."""
 
 from pathlib import Path
 from types import SimpleNamespace
