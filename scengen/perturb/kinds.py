@@ -80,7 +80,7 @@ def stream_kind(stream: str) -> str:
     """Which kind of reading a stream is."""
     if "force_torque" in stream:
         return WRENCH
-    own = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")
+    own = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "joint_acc", "gripper_qpos", "gripper_qvel")
     if stream.startswith("robot") and stream.endswith(own):
         return PROPRIOCEPTION
     return "" if "tactile" in stream else OBJECTS

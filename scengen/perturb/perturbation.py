@@ -68,9 +68,23 @@ class Perturbation:
         parts = tuple(part for part in self.parts if kinds()[part[0]].effect.reads == CONTROL)
         return Conditions(parts, embodiment) if parts else None
 
+    def check_perceived(self, why: str) -> None:
+        """Raise `BadConfig` if a part changes what happens and not only what is perceived.
+
+        Args:
+            why: reason why such parts have no place here, and what to do instead.
+        """
+        if posed := [name for name, _ in self.parts if kinds()[name].effect.reads == CONTROL]:
+            raise BadConfig(f"perturb = {self}; {posed[0]} changes what happens: {why}")
+
+    @property
+    def shows_spares(self) -> bool:
+        """Whether a part shows spare geoms."""
+        return any(kinds()[name].effect.is_added for name, _ in self.parts)
+
     def dressed(self, look: Look) -> Look:
         """A look of a scene that is to be perturbed: with spare geoms if a part shows them."""
-        return with_spares(look) if any(kinds()[name].effect.is_added for name, _ in self.parts) else look
+        return with_spares(look) if self.shows_spares else look
 
     def check(self, streams: Sequence[str], cameras: Sequence[str], look: Look = ROOM) -> None:
         """Raise `BadConfig` if a part affects nothing that is observed. Instruction and control always count.
