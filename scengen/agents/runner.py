@@ -101,7 +101,7 @@ class AgentSettings:
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""
         at_least(self, seeds=1, width=16, explore=0, perturb_seed=0)
-        self.perturbation  # noqa: B018  (it raises an error)
+        self.perturbation.check_perceived("make a pool under it with generate perturb=, and ask about that")
         self.budget.check()
         if not 0.0 < self.timeout <= 86_400.0:
             raise BadConfig(f"timeout = {self.timeout:g}; it must lie in (0, 86400] s")

@@ -145,6 +145,7 @@ class RobosuiteEnv(ManipulationEnv):
                 perturbation affects nothing that is observed.
         """
         self.perturbation, self._perturb_seed = Perturbation.parse(perturb), perturb_seed
+        self.perturbation.check_perceived("robosuite's own controller would ignore it; use the Gymnasium environment")
         _check_filter_rate(action_filter, control_freq)
         check_rules(rules)
         if reward_shaping:

@@ -198,5 +198,10 @@ def test_conditions_upon_conditions_and_films_of_what_happened_are_refused(tmp_p
     with pytest.raises(BadConfig, match="has conditions of control already"):
         posed = Conditions((("payload", 1),), JAW)
         stored_world(type(row)(**{**vars(row), "scene_xml": text}), None, posed)
+    for words, told in {
+        ("show", "film", f"pool={REFERENCE}", "id=8ed4", f"to={tmp_path / 'f.png'}"): "film that",
+        ("agent", f"pool={REFERENCE}", "model=x", "endpoint=http://localhost:1"): "ask about that",
+    }.items():
+        assert cli.run([*words, "perturb=payload@1"]) == 2 and told in capsys.readouterr().err
     words = ["record", f"pool={REFERENCE}", f"to={tmp_path / 'r'}", "perturb=payload@1"]
-    assert cli.run(words) == 2 and "conditions of control change what happens" in capsys.readouterr().err
+    assert cli.run(words) == 2 and "payload changes what happens: a recording films" in capsys.readouterr().err

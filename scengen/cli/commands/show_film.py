@@ -70,7 +70,7 @@ class FilmSettings:
         if self.raw and self.of == WITNESS:
             raise BadConfig("raw = true plays a shortcut without the filter; give one as of=NAME, or leave raw out")
         look_named(self.look)
-        Perturbation.parse(self.perturb)
+        Perturbation.parse(self.perturb).check_perceived("make a pool under it with generate perturb=, and film that")
         at_least(self, frames=1, fps=1, width=1, height=1, perturb_seed=0)
         check_format(Path(self.to), self.frames, self.fps, self.width, self.height)
 
