@@ -82,6 +82,11 @@ class Perturbation:
         """Whether a part shows spare geoms."""
         return any(kinds()[name].effect.is_added for name, _ in self.parts)
 
+    @property
+    def is_of_words(self) -> bool:
+        """Whether all parts change the instruction, and nothing else."""
+        return bool(self) and all(kinds()[name].effect.reads == LANGUAGE for name, _ in self.parts)
+
     def dressed(self, look: Look) -> Look:
         """A look of a scene that is to be perturbed: with spare geoms if a part shows them."""
         return with_spares(look) if self.shows_spares else look

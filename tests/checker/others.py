@@ -227,6 +227,9 @@ DEMONSTRATIONS: dict[str, tuple[str, Forge, str]] = {
     "rules": ("demonstrations", config(rules="paper"), "│ rules"),
     "apart from nothing": ("demonstrations", config(apart=[HASH]), "claimed, and not checked: apart from 1 pools"),
     "policy": ("idle", manifest(policy="ours:v9"), "claimed, and not checked: policy 'ours:v9' drove the robot"),
+    "perturbed": ("idle", manifest(condition="noise@5", perturb_seed=3), "drove the robot under 'noise@5', seed 3"),
+    "perturbed without a seed": ("idle", manifest(condition="noise@5"), "a condition"),
+    "perturbed without a policy": ("demonstrations", manifest(condition="blind", perturb_seed=0), "a condition"),
     "failures dropped": ("idle", dropped, "does not hold|the funnel"),
     "failures doubled": ("idle", doubled, "occurs twice"),
     "a success among failures": ("oracle", twice_failed, "is a success among the failed attempts"),
@@ -319,6 +322,30 @@ def _accepted(folder: Path) -> None:
     (folder / "curation/decisions.csv").write_text("episode,verdict,who,why\n0,accept,me,fine\n")
 
 
+def _perturbed(kinds: str, seed: Any, folder: Path) -> None:
+    """Every episode says that what it shows was perturbed."""
+    table = pq.read_table(folder / EPISODES)
+    for name, value in (("perturb", kinds), ("perturb_seed", seed)):
+        table = table.append_column(f"scengen/{name}", pa.array([value] * len(table)))
+    pq.write_table(table, folder / EPISODES)
+
+
+def _copied(kinds: str, folder: Path) -> None:
+    """The only episode a second time, under another seed of a perturbation."""
+    rows, episodes = pq.read_table(folder / ROWS), pq.read_table(folder / EPISODES)
+    count = len(rows)
+    again = rows.to_pydict()
+    again["index"], again["episode_index"] = [n + count for n in again["index"]], [1] * count
+    pq.write_table(pa.concat_tables([rows, pa.table(again, rows.schema)]), folder / ROWS)
+    (one,) = episodes.to_pylist()
+    two = {**one, "episode_index": 1, "dataset_from_index": count, "dataset_to_index": 2 * count}
+    both = [{**each, "scengen/perturb": kinds, "scengen/perturb_seed": seed} for seed, each in enumerate((one, two))]
+    schema = episodes.schema.append(pa.field("scengen/perturb", pa.string()))
+    pq.write_table(
+        pa.Table.from_pylist(both, schema.append(pa.field("scengen/perturb_seed", pa.int64()))), folder / EPISODES
+    )
+
+
 def _instruction(folder: Path) -> None:
     table = pq.read_table(folder / "meta/tasks.parquet")
     array = pa.array(["Wave."], pa.string())
@@ -347,6 +374,13 @@ RECORDINGS: dict[str, tuple[Callable[[Path], None], str]] = {
         "INFO",
     ),
     "column without a description": (_unannounced, "INFO"),
+    "a perturbation that shows nowhere": (partial(_perturbed, "light_direction@3", 0), "REPLAY"),
+    "a perturbation of readings": (partial(_perturbed, "proprioception_noise@1", 0), "REPLAY"),
+    "an unknown perturbation": (partial(_perturbed, "magic@1", 0), "REPLAY"),
+    "half a seed": (partial(_perturbed, "reworded@1", 0.5), "REPLAY"),
+    "other words": (partial(_perturbed, "reworded@1", 0), "TASK"),
+    "a copy in a look that shows nowhere": (partial(_copied, "light_direction@3"), "REPLAY"),
+    "a copy in words that it does not have": (partial(_copied, "verbose@1"), "DUPLICATE"),
     "two numbers for a place": (_narrow, "MISSING_FIELD"),
     "rate": (_twice_as_fast, "INFO"),
     "robot": (partial(_json, "meta/info.json", lambda p: p.update(robot_type="panda_suction")), "INFO|not a recording"),

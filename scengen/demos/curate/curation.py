@@ -14,6 +14,7 @@ Only the recording itself is read: nothing in it depends on results of policies.
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,9 +23,10 @@ import numpy as np
 
 from ... import compose
 from ...agents.models import made
-from ...errors import PoolError
+from ...errors import PoolError, ScengenError
 from ...export.dataset import CURATION, EpisodeData, Recording
 from ...export.recording import CONTROL_ACTIONS
+from ...perturb.perturbation import Perturbation
 from ...pool.files import read_json_file, replace_file, sha256
 from ...work.parallel import UNTRUSTED_LIMITS, Workers, each
 from ...work.targets import try_folder
@@ -135,8 +137,8 @@ def _examined(
             frozen = {camera: one for camera, one in told if settings.replay and one.check == FROZEN_CAMERA}
             findings += [one for camera, one in told if frozen.get(camera) is not one]
             made = (*made, *(f"video {camera}" for camera in recording.cameras), "duplicate")
-            look = [str(episode.about.get(f"scengen/{name}", "")) for name in ("id", "perturb", "perturb_seed")]
-            content = sha256(np.ascontiguousarray(episode.columns[CONTROL_ACTIONS]).tobytes() + "|".join(look).encode())
+            actions = np.ascontiguousarray(episode.columns[CONTROL_ACTIONS]).tobytes()
+            content = sha256(actions + "|".join(_perceived_of(episode.about)).encode())
             if (twin := twins.setdefault(content, episode.number)) != episode.number:
                 findings.append(found("DUPLICATE", f"it repeats episode {twin}", (), "error", episode=twin))
             if settings.replay:
@@ -172,6 +174,15 @@ def _examined(
     reports = [replace(report, findings=(*report.findings, *shared)) for report in reports]
     scores = _scores_of_readable(terms, tasks, solved)
     return [replace(report, score=score) for report, score in zip(reports, scores, strict=True)], jobs, whole
+
+
+def _perceived_of(about: Mapping[str, Any]) -> list[str]:
+    """What tells episodes of the same actions apart: the scenario, and its look or its instruction."""
+    told = {name: str(about.get(f"scengen/{name}", "")) for name in ("id", "perturb", "perturb_seed")}
+    with suppress(ScengenError):
+        if Perturbation.parse(told["perturb"]).is_of_words:
+            return [told["id"], *map(str, about.get("tasks") or ())]
+    return [*told.values()]
 
 
 def _scores_of_readable(

@@ -198,12 +198,28 @@ def _replayed(recorded: Recorded) -> Replayed:
     perturbation = Perturbation.parse(str(recorded.told.get("scengen/perturb", "")))
     world = World.load(text, robot, perturbation.dressed(recorded.look) if recorded.films else None)
     cameras = tuple(_wrong_cameras(recorded, scenario, world))
-    seed = int(recorded.told.get("scengen/perturb_seed", 0))
+    seed = _checked_seed(recorded, perturbation)
     senses = perturbation.senses(world.model, scenario.id, task.name, task.instruction, seed, recorded.search)
     world.reset()
     labels = tuple(wrong_labels(recorded.told, task, scenario, text, senses.drawn.instruction))
     found = _played(recorded, scenario, world, text, senses)
     return replace(found, findings=(*labels, *cameras, *found.findings))
+
+
+def _checked_seed(recorded: Recorded, perturbation: Perturbation) -> int:
+    """Seed of a perturbation, of which each part must show in what was recorded: else it is a name for nothing.
+
+    Raises:
+        ScengenError: a part shows nowhere.
+        ValueError: the seed is no whole number.
+    """
+    seed = recorded.told.get("scengen/perturb_seed", 0)
+    if type(seed) is not int or seed < 0:
+        raise ValueError(f"scengen/perturb_seed is {seed!r:.40}; it must be a whole number")
+    views = cameras_of(recorded.task.embodiment)
+    seen = [views[camera.removeprefix(IMAGES_PREFIX)] for camera in recorded.cameras]
+    perturbation.check([NAME if name == ENVIRONMENT else name for name in recorded.streams], seen, recorded.look)
+    return seed
 
 
 def _played(recorded: Recorded, scenario: Scenario, world: World, text: str, senses: Senses) -> Replayed:
