@@ -34,6 +34,7 @@ from scengen.measures.figures import table
 from scengen.measures.policies import POLICIES
 from scengen.ood.analysis.leaks import SEARCH
 from scengen.ood.baseline import INCONCLUSIVE
+from scengen.samplers.conditions import KINDS
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
 
@@ -177,6 +178,24 @@ def drift() -> dict[str, str]:
     rows = [row for task in list_tasks() for row in ledger.newest("drift", task)]
     sets = sorted({tuple(row.made_with["mujoco"]) for row in rows})
     return {"drift": "\n".join(_drifted(names, [row for row in rows if row.has(mujoco=[*names])]) for names in sets)}
+
+
+def control() -> dict[str, str]:
+    """Conditions of control that each task bears: for each kind the scenarios certified at levels 1 to 5."""
+    lines = []
+    for task in list_tasks():
+        row = next(iter(ledger.newest("control", task)), None)
+        cells = [_borne(row.value[kind]) if row else ledger.not_measured(task) for kind in KINDS]
+        lines.append([link(task), f"{row.n}{ledger.mark(row)}" if row else NONE, *cells])
+    return {"control": table(("task", "scenarios", *(f"`{kind}`" for kind in KINDS)), lines)}
+
+
+def _borne(figures: Mapping[str, Any]) -> str:
+    """The cell of a kind: certified scenarios by level, with a star where solutions end in the usual bits."""
+    return " ".join(
+        f"{count}{'*' if level in figures['without_effect'] else ''}"
+        for level, count in enumerate(figures["certified"], 1)
+    )
 
 
 def _drifted(versions: Sequence[str], rows: Sequence[Evidence]) -> str:

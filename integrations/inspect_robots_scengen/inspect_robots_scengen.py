@@ -15,7 +15,10 @@ from scengen.assets.prop import TABLE_TOP
 from scengen.control.osc import STEP, TURN
 from scengen.envs.gym import PoolEnv, action_repeat_at
 from scengen.envs.pools import rows_of
+from scengen.perturb.language import Words
+from scengen.perturb.perturbation import Perturbation
 from scengen.pool import Pool
+from scengen.pool.row import SceneRow
 from scengen.sim.embodiment import hands
 
 ARM = ("dx", "dy", "dz", "rx", "ry", "rz", "gripper")
@@ -36,6 +39,8 @@ class ScengenEmbodiment(EmbodimentBase):
         cameras: bool = True,
         settle: bool = True,
         rules: str = "strict",
+        perturb: str | None = None,
+        perturb_seed: int = 0,
     ):
         """
         Args:
@@ -45,6 +50,8 @@ class ScengenEmbodiment(EmbodimentBase):
             cameras: whether the policy gets pictures; they need OpenGL.
             settle: whether a reached goal must still hold after a second with the robot idle.
             rules: `strict` or `paper`.
+            perturb: kinds of perturbation at their levels, such as `light_direction@3+noise@1`.
+            perturb_seed: another number draws other perturbations for the same scenarios.
 
         Raises:
             ScengenError: a setting or a pool is not valid.
@@ -61,6 +68,8 @@ class ScengenEmbodiment(EmbodimentBase):
             action_repeat=action_repeat_at(hz, "hz"),
             settle=settle,
             rules=rules,
+            perturb=perturb,
+            perturb_seed=perturb_seed,
         )
         arms = len(hands(embodiment))
         sides = [""] if arms == 1 else ["right_", "left_"]
@@ -115,7 +124,7 @@ class ScengenEmbodiment(EmbodimentBase):
             terminated=success or terminated,
             termination_reason=reason,
             truncated=truncated and not success,
-            info={"success": success},
+            info={"success": success, "perturb": self.env.drawn.plain()},
         )
 
     def close(self) -> None:
@@ -130,24 +139,34 @@ class ScengenEmbodiment(EmbodimentBase):
         )
 
 
-def scengen_task(pool: str, *, split: str = "id", n: int = 20) -> Task:
+def scengen_task(
+    pool: str, *, split: str = "id", n: int = 20, perturb: str | None = None, perturb_seed: int = 0
+) -> Task:
     """The first `n` scenarios of a split as scenes. Their ids are hashes, which reveal nothing to a policy.
 
     Args:
         pool: folder of a pool, or several folders separated by commas, of one task.
         split: the split.
         n: number of scenarios.
+        perturb: the perturbation of the embodiment, which may change the instruction. It is part of the name.
+        perturb_seed: that of the embodiment.
 
     Raises:
-        UnknownName: the pools have no such split.
+        ScengenError: the pools have no such split, or there is no such perturbation.
     """
     pools = folders(pool)
     own = rows_of(pools, first_task(pools)).of_split(split)
     chosen = [own[i] for i in range(min(n, len(own)))]
     longest = max(row.horizon for row in chosen)
+    perturbation = Perturbation.parse(perturb)
+
+    def instruction(row: SceneRow) -> str:
+        words = Words.of(row.task, row.instruction)
+        return perturbation.of(row.id, perturb_seed, words=words).instruction or row.instruction
+
     return Task(
-        name=f"scengen/{chosen[0].task}/{split}",
-        scenes=[Scene(id=row.id, instruction=row.instruction) for row in chosen],
+        name="/".join(["scengen", chosen[0].task, split, *([str(perturbation)] if perturbation else [])]),
+        scenes=[Scene(id=row.id, instruction=instruction(row)) for row in chosen],
         scorer="success_at_end",
         max_seconds=longest + 1.0,
     )

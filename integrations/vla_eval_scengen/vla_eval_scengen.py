@@ -43,6 +43,8 @@ class ScengenBenchmark(StepBenchmark):
         width: int = 256,
         settle: bool = True,
         rules: str = "strict",
+        perturb: str | None = None,
+        perturb_seed: int = 0,
     ):
         """
         Args:
@@ -54,6 +56,8 @@ class ScengenBenchmark(StepBenchmark):
             width: width and height of pictures [pixels].
             settle: whether a reached goal must still hold after a second with the robot idle.
             rules: `strict` or `paper`.
+            perturb: kinds of perturbation at their levels, such as `light_direction@3+noise@1`. Results name them.
+            perturb_seed: another number draws other perturbations for the same scenarios.
 
         Raises:
             ScengenError: a setting or a pool is not valid.
@@ -65,6 +69,7 @@ class ScengenBenchmark(StepBenchmark):
         self.splits, self.embodiment = splits or sorted(rows.kinds("split")), rows[0].embodiment
         self.horizon = max(limit for split in self.splits for (limit,) in rows.of_split(split).columns("horizon"))
         self.state = proprioception(self.embodiment)
+        self._envs: dict[str, PoolEnv] = {}
         self.settings = {
             "observations": [*self.state, *self.cameras],
             "action_repeat": action_repeat_at(hz, "hz"),
@@ -72,8 +77,10 @@ class ScengenBenchmark(StepBenchmark):
             "height": width,
             "settle": settle,
             "rules": rules,
+            "perturb": perturb,
+            "perturb_seed": perturb_seed,
         }
-        self._envs: dict[str, PoolEnv] = {}
+        self._env(self.splits[0])  # what is not valid is refused here
 
     def get_tasks(self) -> list[Task]:
         """A task for every split. vla-eval passes it to the model server, which must not read the name."""
@@ -109,12 +116,14 @@ class ScengenBenchmark(StepBenchmark):
     def get_step_result(self, step_result: StepResult) -> EpisodeResult:
         """Success, and the reason of a failure."""
         info = step_result.info
-        return {"success": bool(info["success"]), "reason": info["reason"], "scenario": self._running.row.id}
+        told = {"scenario": self._running.row.id, "perturb": self._running.drawn.plain()}
+        return {"success": bool(info["success"]), "reason": info["reason"], **told}
 
     def get_metadata(self) -> dict[str, Any]:
-        """Number of steps until the longest time limit."""
+        """Number of steps until the longest time limit, and settings."""
         seconds = Loop.PERIOD * self.settings["action_repeat"]
-        return {"max_steps": round(self.horizon / seconds) + 1, "settle": self.settings["settle"]}
+        told = {name: self.settings[name] for name in ("settle", "perturb", "perturb_seed")}
+        return {"max_steps": round(self.horizon / seconds) + 1, **told}
 
     def get_hold_action(self, last_action: Action | None) -> Action:
         """No displacement, and the last gripper command."""

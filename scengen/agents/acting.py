@@ -32,6 +32,8 @@ RETRIES = 3
 """Number of refused calls after which the robot holds (paper, App. F)."""
 HOLD = Call("Hold", '{"ticks": 50}')
 """Call in place of refused ones."""
+HAND = "robot0_eef_pos"
+"""Stream with the position of the first hand [m], as the memory tells it."""
 SEE = "see"
 POSES = "poses"
 POSES_SEEN = "poses_seen"
@@ -76,7 +78,7 @@ class Episode:
         frames = {name: picture for batch in self.frames for name, picture in batch.items()}
         text = prompt(
             "act",
-            instruction=" ".join(self.exam.row.instruction.split()),
+            instruction=" ".join(self.env.instruction.split()),
             robot=robot(self.exam.row.embodiment),
             controller=controller(self.exam.row.embodiment),
             table=TABLE_TOP,
@@ -147,7 +149,7 @@ class Episode:
                 why = "the episode is over"
                 break
         self.look()
-        at = ", ".join(f"{value:.3f}" for value in self.env.world.arms[0].hand)
+        at = ", ".join(f"{value:.3f}" for value in self.observation[HAND])
         return f"{self.neutral(why)}, after {(self.ticks - before) * Loop.PERIOD:.2f} s, hand at ({at})"
 
 

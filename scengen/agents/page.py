@@ -54,4 +54,5 @@ def write_page(
 
 
 def _key(about: Mapping[str, Any]) -> tuple[Any, ...]:
-    return tuple(about[name] for name in ("task", "split", "scenario", "temperature", "stage"))
+    named = tuple(about[name] for name in ("task", "split", "scenario", "temperature", "stage"))
+    return *named, *(str(about.get(name, "")) for name in ("perturbation", "perturb_seed"))

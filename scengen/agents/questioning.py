@@ -1,7 +1,7 @@
 """Stages 1 and 2: questions about a scenario, and a plan for it, asked from a model and graded."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, TypeVar
 
 from ..pool import PoolRow
@@ -42,23 +42,27 @@ class Exam:
     """One scenario with everything that its questions need."""
 
     row: PoolRow
+    instruction: str
+    """The instruction as the model is given it."""
     sheet: Sheet
     facts: tuple[Fact, ...]
     view: View
     temperature: float
     stand_in: Model | None
     """Stand-in that answers instead of the run's model; None for a real model."""
+    perturbed: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """Names of the perturbation and what it drew; none without one."""
 
     @property
     def about(self) -> dict[str, Any]:
-        """Names for the journal; no prompt contains them."""
+        """Names for journal and results; no prompt contains them."""
         names = {"task": self.row.task, "split": self.row.split, "index": self.row.index, "scenario": self.row.id}
-        return {**names, "temperature": self.temperature}
+        return {**names, "temperature": self.temperature, **self.perturbed}
 
     @property
     def scene(self) -> str:
         """The part of all prompts that describes the scene."""
-        return scene_text(self.row.instruction, self.row.embodiment, self.sheet.objects, self.view)
+        return scene_text(self.instruction, self.row.embodiment, self.sheet.objects, self.view)
 
     @property
     def system(self) -> Turn:

@@ -13,7 +13,10 @@ from typing import Any
 from .. import compose
 from ..control.teleop import TELEOP
 from ..envs.gym import PoolEnv
+from ..envs.observations import cameras_of
 from ..errors import BadConfig, UnknownName, cut
+from ..perturb.language import Words
+from ..perturb.perturbation import Perturbation
 from ..pool import Pool, PoolRow, collection
 from ..samplers.split import ID
 from ..samplers.task import Task
@@ -62,6 +65,8 @@ class AgentSettings:
     temperatures: list[float] = field(default_factory=lambda: [0.0])
     pictures: bool = True
     width: int = 384
+    perturb: str | None = None
+    perturb_seed: int = 0
     moments: int = 3
     spacing: float = 0.5
     budget: Budget = Budget()
@@ -78,6 +83,16 @@ class AgentSettings:
         return collection.folders(self.pool)
 
     @property
+    def perturbation(self) -> Perturbation:
+        """Perturbation of what the model sees and reads."""
+        return Perturbation.parse(self.perturb)
+
+    @property
+    def title(self) -> str:
+        """Model and perturbation, for tables."""
+        return f"{self.model} under {self.perturbation}" if self.perturbation else self.model
+
+    @property
     def folder(self) -> Path:
         """Folder of the results."""
         plain = "".join(letter if letter.isalnum() or letter in ".-" else "_" for letter in self.model)
@@ -85,7 +100,8 @@ class AgentSettings:
 
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""
-        at_least(self, seeds=1, width=16, explore=0)
+        at_least(self, seeds=1, width=16, explore=0, perturb_seed=0)
+        self.perturbation.check_perceived("make a pool under it with generate perturb=, and ask about that")
         self.budget.check()
         if not 0.0 < self.timeout <= 86_400.0:
             raise BadConfig(f"timeout = {self.timeout:g}; it must lie in (0, 86400] s")
@@ -140,7 +156,7 @@ def works(settings: AgentSettings, search: Sequence[str] = ()) -> list[Work]:
     """The first scenarios of each pool, and their tasks.
 
     Raises:
-        ScengenError: a pool is damaged or empty, or its task states no facts.
+        ScengenError: a pool is damaged or empty, its task states no facts, or a perturbation changes nothing of it.
     """
     found = []
     for folder in settings.folders:
@@ -149,9 +165,20 @@ def works(settings: AgentSettings, search: Sequence[str] = ()) -> list[Work]:
             raise BadConfig(f"{pool.folder} holds no scenario; choose another pool")
         for row in itertools.islice(pool.rows(witness=False), settings.seeds):
             found.append(Work(compose.load_task(row.task, search), folder, row))
-    for task in {work.task.name: work.task for work in found}.values():
-        facts.load(task, search)
+    for work in {work.task.name: work for work in found}.values():
+        facts.load(work.task, search)
+        _check_perturbation(settings, work.row, search)
     return sorted(found, key=lambda work: work.task.name)
+
+
+def _check_perturbation(settings: AgentSettings, row: PoolRow, search: Sequence[str]) -> None:
+    """Raise `BadConfig` if the model is given nothing that the perturbation affects, or the task has no other text."""
+    cameras, perturbation = cameras_of(row.embodiment), settings.perturbation
+    given = streams(row.embodiment, settings.pictures)
+    seen = [camera for name, camera in cameras.items() if name in given]
+    perturbation.check([name for name in given if name not in cameras], seen)
+    words = Words.of(row.task, row.instruction, search)
+    perturbation.of(row.id, words=words).instruction  # noqa: B018  (it raises an error)
 
 
 @dataclass(frozen=True)
@@ -206,7 +233,7 @@ def run(
             calls.recall(Path(settings.model.removeprefix(TRANSCRIPT)))
         write(folder / SETTINGS, json.dumps(asdict(settings), indent=1) + "\n")
         results, stopped, total = list[dict[str, Any]](), "", len(todo) * len(settings.temperatures)
-        refused, in_a_row = list[str](), 0
+        refused, in_a_row, perturbed = list[str](), 0, {"perturbation": str(settings.perturbation)}
         try:
             for work, exam, env in exams(settings, todo, ask, search):
                 try:
@@ -219,7 +246,7 @@ def run(
                 in_a_row = 0
                 if settings.stage == PLAN and executions:
                     found[-1] = _executed(work, exam, found[-1], executions)
-                results += [{**_labels(work), **each.plain()} for each in found]
+                results += [{**_labels(work), **perturbed, **each.plain()} for each in found]
                 progress(sum(r["stage"] == settings.stage for r in results), total)
         except OutOfBudget as error:
             stopped = str(error)
@@ -282,6 +309,8 @@ def exams(
             action_filter=TELEOP,
             settle=True,
             search=search,
+            perturb=settings.perturb,
+            perturb_seed=settings.perturb_seed,
         )
         fixed = {id_: prior.answer for id_, prior in priors(task, sheet).items()} if settings.model == "blind" else {}
         with closing(env):
@@ -289,8 +318,18 @@ def exams(
                 moments = 1 if settings.stage == ACT else settings.moments
                 view = observe(env, work.row.id, moments, settings.spacing)
                 stand_in = _stand_in(settings, mine, told, number, sheet, fixed) if ask else None
+                about = _drawn(settings, env)
                 for temperature in settings.temperatures:
-                    yield work, Exam(work.row, sheet, told[number], view, temperature, stand_in), env
+                    made = (work.row, env.instruction, sheet, told[number], view, temperature, stand_in, about)
+                    yield work, Exam(*made), env
+
+
+def _drawn(settings: AgentSettings, env: PoolEnv) -> dict[str, Any]:
+    """Labels of the perturbation of the running scenario; none without one."""
+    if not settings.perturbation:
+        return {}
+    told = {"perturbation": str(settings.perturbation), "perturb_seed": settings.perturb_seed}
+    return {**told, "perturb": env.drawn.plain()}
 
 
 def _stand_in(

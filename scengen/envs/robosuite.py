@@ -7,6 +7,7 @@ robosuite composes the model, its controller moves the robot, and its clock step
 the scene, the suction cup, the events of the scene, and the verdict, which is that of certification.
 """
 
+import math
 import re
 import threading
 from collections import OrderedDict
@@ -24,6 +25,9 @@ from ..control.osc import CLOSED_JAW
 from ..control.teleop import check_filter
 from ..episode import STRICT, Episode, Rules, check_rules
 from ..errors import BadConfig, PoolError, UnknownName
+from ..look.looks import PLAIN
+from ..perturb.drawn import Drawn, Senses
+from ..perturb.perturbation import Perturbation
 from ..pictures.opengl import check_size, current, release
 from ..pool import PoolRow
 from ..pool.library import Library
@@ -35,9 +39,10 @@ from ..sim.embodiment import JAW, SUCTION, action_size, all_hands, hands
 from ..sim.world import World
 from ..validate.identity import check_versions
 from ..validate.playable import scene_errors
-from .object_state import ObjectState, bodies_of, rounded
+from .object_state import NAME, ObjectState, bodies_of, rounded
 from .observations import turns_pictures
 from .pools import Folders, chosen, scenes_of
+from .robomimic import IMAGE, names
 from .robosuite_models import SceneModel, SceneTask  # first, because it keeps robosuite's import quiet
 
 # isort: split
@@ -51,6 +56,8 @@ Observations = OrderedDict[str, Any]
 
 ROBOT = "Panda"
 """robosuite's name of the certified robot."""
+JOINT_POS = "joint_pos"
+"""End of the name of the reading from which robosuite also gives cosine and sine."""
 GRIPPERS = {JAW: "PandaGripper", SUCTION: "SuctionGripper"}
 """robosuite's names of the hands of scengen's embodiments."""
 
@@ -68,6 +75,10 @@ class RobosuiteEnv(ManipulationEnv):
     segmentation included. `seen_<body>_pos`, of modality "seen", is the position at which the picture shows a body.
     `<body>_pos`, the robot's own pose and actions stay as they are. `object-state` is that of the Gymnasium
     environment, entry by entry.
+
+    Under a perturbation lights, cameras, colour pictures, readings and the instruction are drawn as in the Gymnasium
+    environment with `look="plain"`, whose scenes these are. Readings in `object-state` have its errors. Depth and
+    segmentation are those of the changed cameras, without what happens to pictures. `info` holds `perturb`.
 
     `get_ep_meta` contains the id of the scenario, for robosuite's demonstrations. After `set_ep_meta` with this id,
     hard resets load that scenario.
@@ -102,6 +113,8 @@ class RobosuiteEnv(ManipulationEnv):
         rules: Rules = STRICT,
         reward_scale: float = 1.0,
         reward_shaping: bool = False,
+        perturb: str | None = None,
+        perturb_seed: int = 0,
         **arguments: Any,
     ):
         """Select the scenarios and build the first one.
@@ -122,12 +135,17 @@ class RobosuiteEnv(ManipulationEnv):
                 the oracles, which is defined for 100 Hz.
             reward_scale: reward of a reached goal.
             reward_shaping: False. There is no intermediate reward, because it would reveal how to solve the puzzle.
+            perturb: kinds of perturbation at their levels, such as `camera_angle@3+noise@1` (docs/perturb.md).
+            perturb_seed: another number draws other perturbations for the same scenarios.
             arguments: the other arguments of robosuite's ManipulationEnv, with its defaults.
 
         Raises:
             ScengenError: there is no such scenario, or it is of another task, or was made with other versions of
-                MuJoCo or robosuite; pictures cannot have this size, or are turned by a quarter and are not square.
+                MuJoCo or robosuite; pictures cannot have this size, or are turned by a quarter and are not square; a
+                perturbation affects nothing that is observed.
         """
+        self.perturbation, self._perturb_seed = Perturbation.parse(perturb), perturb_seed
+        self.perturbation.check_perceived("robosuite's own controller would ignore it; use the Gymnasium environment")
         _check_filter_rate(action_filter, control_freq)
         check_rules(rules)
         if reward_shaping:
@@ -167,7 +185,7 @@ class RobosuiteEnv(ManipulationEnv):
     def step(self, action: NDArray[np.float64]) -> tuple[Observations, float, bool, dict[str, Any]]:
         """Step as robosuite does, after the action filter, if there is one."""
         self._begin_episode()  # robosuite allows a step without a reset
-        return super().step(self.world.filter(action) if self.action_filter else action)
+        return super().step(self.world.received(action) if self.action_filter else action)
 
     @property
     def action_spec(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -221,14 +239,22 @@ class RobosuiteEnv(ManipulationEnv):
         self.scenario = self.task.scenario(self.row.params)
         for width, height in zip(self.camera_widths, self.camera_heights, strict=True) if self.use_camera_obs else ():
             self.scenario.orientation.check_size(width, height)
-        self.model = self._composed(self.row)
+        cameras = list(map(str, self.camera_names)) if self.use_camera_obs else []
+        self.perturbation.check(self._streams, cameras, PLAIN)
+        self.model = self._composed(self.row, self.perturbation.shows_spares)
 
-    def _composed(self, row: SceneRow) -> SceneTask:
-        """The scene of a row with the loaded robots."""
+    @property
+    def _streams(self) -> list[str]:
+        """This package's names of the observed streams."""
+        own = {f"robot{number}_{JOINT_POS}" for number in range(len(all_hands(self.task.embodiment)))}
+        return [*own, *([NAME] if self.use_object_obs else [])]
+
+    def _composed(self, row: SceneRow, spare: bool = False) -> SceneTask:
+        """The scene of a row with the loaded robots, and with spare geoms for distractors if they are needed."""
         robots = [robot.robot_model for robot in self.robots]
         for robot, base in zip(robots, panda.bases(len(robots)), strict=True):
             robot.set_base_xpos(robot.base_xpos_offset["table"](2 * TABLE_HALF) + base - panda.BASE)
-        return SceneTask(SceneModel(row.scene_xml), robots)
+        return SceneTask(SceneModel(row.scene_xml, spare), robots)
 
     def model_text(self, row: SceneRow) -> str:
         """The MJCF of a scenario as composed by robosuite, for demonstrations.
@@ -245,29 +271,83 @@ class RobosuiteEnv(ManipulationEnv):
         if ours != theirs:
             raise BadConfig(f"robosuite.macros.SIMULATION_TIMESTEP = {theirs:g}; the scene's is {ours:g} s")
         self.sim.render = _rendering_in_any_thread(self.sim)
+        row, model = self.row, self.sim.model._model
+        self.drawn: Drawn = self.perturbation.senses(
+            model, row.id, row.task, row.instruction, self._perturb_seed, self.SEARCH
+        ).drawn
 
     def _setup_references(self) -> None:
         super()._setup_references()
         model, data = self.sim.model._model, self.sim.data._data
         self.world = World(model, data, Loop(model, data), len(self.robots) - self._controlled_arms)
+        if self.world.loop.impairment:
+            raise BadConfig(
+                f"{self.row.name} is posed under conditions of control, which robosuite's own controller would ignore; "
+                "play it in the Gymnasium environment"
+            )
 
     def _setup_observables(self) -> Observations:
         observables = super()._setup_observables()
         for name, read in self._object_sensors().items() if self.use_object_obs else ():
             observables[name] = Observable(name=name, sensor=read, sampling_rate=self.control_freq)
+        for name, observable in observables.items() if self.perturbation else ():
+            if observable.modality.endswith("_proprio"):
+                observable.set_sensor(self._erring(name, observable._sensor))
         return observables
 
-    def _create_camera_sensors(self, *arguments: Any, **named: Any) -> tuple[list[Callable[..., Any]], list[str]]:
-        """robosuite's sensors, with pictures in the orientation of the running scenario."""
-        sensors, names = super()._create_camera_sensors(*arguments, **named)
-        return [self._oriented(read) for read in sensors], names
+    def _erring(self, name: str, read: Callable[[Any], NDArray]) -> Callable[[Any], NDArray]:
+        """A sensor of the robot's own pose under the perturbation. Cosine and sine are those of the joints' reading."""
+        robot, of, last = name.rpartition(f"{JOINT_POS}_")
+        function = {"cos": np.cos, "sin": np.sin}.get(last) if of else None
+        if function is None:
+            return self._perceived(names(self.task.embodiment).get(name, name), read, lambda reading: reading)
+        arms = (*self.world.arms, *self.world.partners)
+        number = int(re.sub(r"\D", "", robot))
 
-    def _oriented(self, read: Callable[[Any], NDArray]) -> Callable[[Any], NDArray]:
+        @sensor(modality=read.__modality__)  # type: ignore[attr-defined]
+        def joints(_: Any) -> NDArray:
+            return arms[number].joint_pos
+
+        return self._perceived(f"{robot}{JOINT_POS}", joints, function)
+
+    def _perceived(
+        self, stream: str, read: Callable[[Any], NDArray], function: Callable[[NDArray], NDArray]
+    ) -> Callable[[Any], NDArray]:
+        """A sensor with a function of what is perceived of a stream."""
+
+        @sensor(modality=read.__modality__)  # type: ignore[attr-defined]
+        def perceived(cache: Any) -> NDArray:
+            reading = np.asarray(read(cache), float)
+            entries = [f"{stream}.{number}" for number in range(reading.size)]
+            return function(self._senses.reading(stream, entries, self._moment, reading))
+
+        return perceived
+
+    @property
+    def _moment(self) -> float:
+        """Time of the present observation [s]: the end of a step. robosuite reads its sensors at the beginning."""
+        return math.ceil(self.world.time * self.control_freq - 1e-6) / self.control_freq
+
+    def _create_camera_sensors(self, *arguments: Any, **named: Any) -> tuple[list[Callable[..., Any]], list[str]]:
+        """robosuite's sensors, with pictures in the orientation of the running scenario and under the perturbation."""
+        sensors, labels = super()._create_camera_sensors(*arguments, **named)
+        cameras = [label.removesuffix(IMAGE) if label.endswith(IMAGE) else None for label in labels]
+        return [self._oriented(*each) for each in zip(sensors, cameras, strict=True)], labels
+
+    def _oriented(self, read: Callable[[Any], NDArray], camera: str | None) -> Callable[[Any], NDArray]:
+        """A sensor with pictures as they are perceived.
+
+        Args:
+            camera: name of the camera; None for depth and segmentation.
+        """
         rows = IMAGE_CONVENTION_MAPPING[macros.IMAGE_CONVENTION]  # 1: the first row is at the bottom; -1: on top
 
         @sensor(modality=read.__modality__)  # type: ignore[attr-defined]
         def picture(cache: Any) -> NDArray:
-            return self.scenario.orientation.apply(read(cache)[::-rows])[::-rows]
+            seen = self.scenario.orientation.apply(read(cache)[::-rows])
+            if camera is not None and self.perturbation:
+                seen = self._senses.picture(camera, self._moment, seen)
+            return seen[::-rows]
 
         return picture
 
@@ -282,6 +362,7 @@ class RobosuiteEnv(ManipulationEnv):
             self._close_jaw()
         self.sim.data.qacc_warmstart[:] = 0.0  # the constructors of the controllers have changed it
         self.world.filter.reset()
+        self._senses = Senses(self.drawn)
         self.episode, self._substep = Episode(self.scenario, self.world, self.row.horizon, self.rules), 0
         self._started = False
 
@@ -316,13 +397,17 @@ class RobosuiteEnv(ManipulationEnv):
         reward, done, info = super()._post_action(action)
         success = self._check_success()
         found = {"success": success, "reason": self.episode.reason, "lacks": self.episode.lacks}
-        return reward, done, {**info, "scenario": self.row.id, **found}
+        told = {"perturb": self.drawn.plain()} if self.perturbation else {}
+        return reward, done, {**info, "scenario": self.row.id, **found, **told}
 
     # --- choice of the scenario -----------------------------------------------------------
 
     def get_ep_meta(self) -> dict[str, Any]:
-        """Metadata of an episode for demonstrations: the scenario's id, and the instruction as `lang`."""
-        return {**super().get_ep_meta(), "scenario": self.row.id, "lang": self.row.instruction}
+        """Metadata of an episode for demonstrations: the scenario's id, the instruction as `lang`, the perturbation."""
+        told = {"scenario": self.row.id, "lang": self.drawn.instruction or self.row.instruction}
+        if self.perturbation:
+            told |= {"perturb": str(self.perturbation), "perturb_seed": self._perturb_seed}
+        return {**super().get_ep_meta(), **told}
 
     def _requested_row(self) -> SceneRow | None:
         """The scenario whose id was given to `set_ep_meta`, or None."""
@@ -358,7 +443,8 @@ class RobosuiteEnv(ManipulationEnv):
             @sensor(modality="object")
             def part(_: Any) -> NDArray[np.float64]:
                 if self._object_state is None:  # read once for all readings of a moment
-                    self._object_state = self.objects.read(self.world)
+                    reading = self.objects.read(self.world)
+                    self._object_state = self._senses.reading(NAME, self.objects.names, self._moment, reading)
                 return self._object_state[where]
 
             return part
@@ -368,7 +454,7 @@ class RobosuiteEnv(ManipulationEnv):
             def seen(_: Any) -> NDArray[np.float64]:
                 return self.scenario.orientation.seen_at(rounded(self.world.pos(body), "pos"))
 
-            return seen
+            return self._perceived(f"seen_{body}_pos", seen, lambda reading: reading)
 
         readings = {name: reading(where) for name, where in self.objects.segments.items()}
         turned = [body for body, moves in self.objects.bodies.items() if moves and turns_pictures(self.task.family)]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..compat import ROBOSUITE_RUNS
 from ..errors import ScengenError
 from ..installation import ROBOSUITE
+from ..perturb.distractors import spare_elements
 from ..robots import panda, suction
 from ..sim import scene_text
 
@@ -83,7 +84,11 @@ class SuctionGripper(GripperModel):
 class SceneModel(MujocoXML):
     """A scene as a model of robosuite, with unchanged names."""
 
-    def __init__(self, text: str):
+    def __init__(self, text: str, spare: bool = False):
+        """
+        Args:
+            spare: whether to add the spare geoms of distractors.
+        """
         scene_text.check(text)
         with _temporary_file(text) as path:
             super().__init__(path)
@@ -91,6 +96,8 @@ class SceneModel(MujocoXML):
             # robosuite draws group 1 only, so that all geoms of the scene must be in it. Groups do not affect physics.
             if geom.get("group", "0") == "0":
                 geom.set("group", "1")
+        if spare:
+            self.worldbody.extend(Element("geom", each) for each in spare_elements())
 
 
 class SceneTask(ManipulationTask):

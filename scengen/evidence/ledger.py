@@ -10,14 +10,15 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..errors import BadConfig, cut
+from ..pool.untrusted import read_json
 from ..samplers import task_files
 from ..work import targets
-from ..work.plain import read_plain
+from ..work.plain import MAX_FILE, read_plain
 
 Kind = Literal[
     "certified",
@@ -34,6 +35,7 @@ Kind = Literal[
     "prior",
     "drift",
     "perturb",
+    "control",
 ]
 """Kind of a measurement, and name of its folder in records/.
 
@@ -41,7 +43,8 @@ Kind = Literal[
 `belief`: planners with beliefs of training; `baseline`, `training`: trained policies; `attack`: the adversary; `cheat`:
 cheats of people; `leak`: hidden parameters in observations; `recall`: cheats that the adversary finds again;
 `mutation`: rules left out; `plan`: plans carried out; `prior`: answers that need no look; `drift`: verdicts under other
-versions of MuJoCo; `perturb`: proofs of perturbations.
+versions of MuJoCo; `perturb`: proofs of perturbations; `control`: conditions of control
+under which the oracle succeeds.
 """
 KINDS: tuple[Kind, ...] = get_args(Kind)
 """All kinds."""
@@ -84,6 +87,9 @@ _KINDS_OF_VALUES = {
     **dict.fromkeys(("value", "made_with"), dict),
 }
 """Types of the values of a row, as JSON has them."""
+
+_FIGURES: Mapping[Kind, tuple[str, ...]] = {"certified": ("certified", "indices", "cpu")}
+"""Figures that commands print of rows, by kind: numbers that are not negative."""
 
 _OPENED: ContextVar[tuple[str | None, tuple[str, ...]]] = ContextVar("opened", default=(None, ()))
 """Folder that replaces the ledgers of all tasks, and the overrides that add folders of other packages."""
@@ -177,7 +183,7 @@ def _rows(path: Path) -> list[Evidence]:
     rows: dict[str, Evidence] = {}
     for number, line in enumerate(lines, 1):
         try:
-            row = _row(json.loads(line), path)
+            row = _row(read_json(line, MAX_FILE), path)
             if row.place in rows:
                 raise ValueError(f"a row with this split ({row.split}) and these settings stands above")
         except (ValueError, TypeError, RecursionError, BadConfig) as error:
@@ -202,7 +208,18 @@ def _row(plain: Any, path: Path) -> Evidence:
         raise ValueError(f"it is of kind {cut(row.kind)}, about {cut(row.task)}")
     if row.version < 1 or row.n < 0:
         raise ValueError(f"version = {row.version}, n = {row.n}")
-    return row
+    for name in _FIGURES.get(row.kind, ()):
+        figure = row.value.get(name)
+        if not isinstance(figure, (int, float)) or isinstance(figure, bool) or figure < 0:
+            raise ValueError(f"value has {name} = {cut(repr(figure))}")
+    return replace(row, value=_Entries(row.value), made_with=_Entries(row.made_with))
+
+
+class _Entries(dict[str, Any]):
+    """Entries of a row that was read: one that is read and missing is a fault of the file."""
+
+    def __missing__(self, name: str) -> Any:
+        raise BadConfig(f"a row of the ledger lacks {name}, it has {cut(', '.join(self))}; restore records/")
 
 
 @contextmanager

@@ -1,9 +1,13 @@
 """The table of what was measured of a task, by kind."""
 
+from functools import cache, partial
+
 from rich.table import Table
 
+from ..errors import ScengenError
 from ..samplers.task import ID, Task
 from .ledger import KINDS, Kind, read
+from .measuring import draws_of
 
 EACH_SPLIT: tuple[Kind, ...] = ("certified", "baseline")
 """Kinds that are measured on every split."""
@@ -15,9 +19,11 @@ def evidence_table(task: Task) -> Table:
     """One line for each kind: the splits that were measured on today's version of a task, and those that were not."""
     title = f"evidence: measured on version {task.version}"
     table = Table("kind", "splits", "n", "not measured on this version", title=title, title_justify="left")
+    draws = cache(partial(_draws_of, task))
     for kind in KINDS:
         rows = read(kind, task.name)
-        today = [row for row in rows if row.version == task.version]
+        named = [row for row in rows if row.version == task.version]
+        today = [row for row in named if row.draws == draws(row.split)]
         here = {row.split or "whole task" for row in today}
         wanted = [*([ID] if kind in EACH_SPLIT else []), *(task.axes if kind in (*EACH_SPLIT, *EACH_AXIS) else [])]
         missing = [split for split in wanted if split not in here]
@@ -25,8 +31,18 @@ def evidence_table(task: Task) -> Table:
         lacking = [f"{len(missing)} of {len(wanted)}: {', '.join(missing)}"] if here and missing else []
         lacking += [] if here else [f"not measured on version {task.version}"]
         lacking += [f"measured on version {', '.join(map(str, others))}"] if others else []
+        false = sorted({row.split or "whole task" for row in named if row not in today})
+        lacking += [f"on other draws: {', '.join(false)}"] if false else []
         table.add_row(kind, _names(task, here), str(sum(row.n for row in today)), "; ".join(lacking))
     return table
+
+
+def _draws_of(task: Task, split: str) -> str:
+    """Hash of the first draws of a split; empty if the task does not have it."""
+    try:
+        return draws_of(task, split)
+    except ScengenError:
+        return ""
 
 
 def _names(task: Task, splits: set[str]) -> str:

@@ -144,6 +144,7 @@ class RecordSettings:
         periods_between(self.rate)
         if self.looks > 1 and not self.perturbation:
             raise BadConfig(f"looks = {self.looks}; perturb= makes them differ: give it, or leave looks out")
+        self.perturbation.check_perceived("a recording films what has happened; give it to demos, as a part of split=")
         if self.perturbation and self.format == ROBOMIMIC:
             raise BadConfig(f"perturb = {self.perturb}; robosuite draws its own pictures: use format={LEROBOT}")
         if self.format == ROBOMIMIC:

@@ -87,7 +87,7 @@ class Training:
         """Train for one epoch and keep the result."""
         started = time.process_time()
         if self.kind == KNN:
-            self.arrays = {"inputs": self.learned.inputs, "chunks": self.learned.chunks}
+            self.arrays = self.learned.copied
         else:
             found = [self._fitted(member) for member in range(self.members)]
             self.arrays = {name: np.stack([one[name] for one in found]) for name in found[0]}

@@ -34,6 +34,11 @@ class Samples:
         every = max(1, math.ceil(len(self.inputs) / VALIDATED))
         return Samples(self.inputs[::every], self.chunks[::every])
 
+    @property
+    def copied(self) -> dict[str, NDArray[np.float32]]:
+        """The arrays of a policy of nearest neighbours, which copies the samples."""
+        return {"inputs": self.inputs, "chunks": self.chunks}
+
     def error(self, kind: str, arrays: Arrays) -> float:
         """Mean squared error of the chunks that a policy predicts [variances]."""
         return float(np.square(predict(kind, arrays, self.inputs) - self.chunks).mean())

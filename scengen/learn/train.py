@@ -1,15 +1,17 @@
 """Training of a policy on demonstrations: `scengen train`."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 from filelock import FileLock, Timeout
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from ..errors import BadConfig, UnknownName, cut
 from ..installation import versions
@@ -27,6 +29,8 @@ from .store import FORMAT, LOSS, MAX_MEMBERS, Broken, PolicySettings, StoredPoli
 
 GIVEN_BY_DATA = ("data", "to", "demonstrations", "task")
 """Settings that change no weights, or only by the data, which have a separate hash."""
+ROUNDING = 1e-4
+"""Largest difference of an array that follows from the data, relative beyond 1: machines round differently."""
 UNFINISHED = "unfinished-{identity}.npz"
 """Name of the file of weights of an unfinished training."""
 
@@ -100,10 +104,6 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
     folder, identity = Path(settings.to), _identity(settings, data)
     learned, held_out = parted(data.trajectories)
     with _alone(folder):
-        if is_policy(folder):
-            return Trained(_same(folder, identity), (), len(held_out), 0.0, 0)
-        path = folder / UNFINISHED.format(identity=identity[:16])
-        _check_unfinished(folder, path)
         scaling = scaling_of(data.entries, settings.steps, settings.chunk, learned)
         features = Features(data.entries, settings.steps, scaling["input_mean"], scaling["input_scale"])
         samples = samples_of(features, settings.chunk, scaling, learned)
@@ -111,14 +111,6 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
         hidden, members = ((), 1) if settings.policy == KNN else (tuple(settings.hidden), settings.members)
         limit = None if settings.minutes is None else 60.0 * settings.minutes
         epochs = 1 if settings.policy == KNN else settings.epochs
-        try:
-            run = Training(path, settings.policy, hidden, members, samples, validation, epochs, limit, settings.seed)
-        except (Broken, ValueError, OSError) as error:
-            raise BadConfig(f"{path} is damaged ({cut(str(error))}); delete it to start again") from None
-        earlier = len(run.losses)
-        while run.share < 1.0:
-            run.advance()
-            progress(len(run.losses), epochs, f"loss {run.losses[-1][0]:.4f}, held out {run.losses[-1][1]:.4f}")
         own = PolicySettings(
             kind=settings.policy,
             task=data.task,
@@ -133,7 +125,7 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
             hidden=hidden,
             members=members,
             inputs=samples.inputs.shape[1],
-            epochs=len(run.losses),
+            epochs=epochs,
             seed=settings.seed,
             demonstrations=len(learned),
             rows=len(samples.inputs),
@@ -142,6 +134,20 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
             weights_sha256="",  # that of the file that is written
             versions={**versions(), "scikit-learn": _version("scikit-learn")},
         )
+        if is_policy(folder):
+            copied = samples.copied if settings.policy == KNN else {}
+            return Trained(_same(folder, own, {**scaling, **copied}, limit), (), len(held_out), 0.0, 0)
+        path = folder / UNFINISHED.format(identity=identity[:16])
+        _check_unfinished(folder, path)
+        try:
+            run = Training(path, settings.policy, hidden, members, samples, validation, epochs, limit, settings.seed)
+        except (Broken, ValueError, OSError) as error:
+            raise BadConfig(f"{path} is damaged ({cut(str(error))}); delete it to start again") from None
+        earlier = len(run.losses)
+        while run.share < 1.0:
+            run.advance()
+            progress(len(run.losses), epochs, f"loss {run.losses[-1][0]:.4f}, held out {run.losses[-1][1]:.4f}")
+        own = replace(own, epochs=len(run.losses))
         write(folder / LOSS, _curve(own, run.losses))
         own = StoredPolicy(own, {**scaling, **run.arrays}).write(folder)
         path.unlink(missing_ok=True)
@@ -176,16 +182,34 @@ def _alone(folder: Path) -> Iterator[None]:
         raise refused(folder, error) from None
 
 
-def _same(folder: Path, identity: str) -> PolicySettings:
+def _same(
+    folder: Path, own: PolicySettings, arrays: Mapping[str, NDArray[np.float32]], limit: float | None
+) -> PolicySettings:
     """The settings of a policy that is there already.
 
+    Args:
+        own: those that the training gives.
+        arrays: those of its arrays that follow from the data without a training.
+        limit: largest processor time of the training [s], before which it may end; None if there is none.
+
     Raises:
-        BadConfig: it comes from another training.
+        BadConfig: it comes from another training, or has entries that this training does not give.
     """
-    found = StoredPolicy.open(folder).settings
-    if found.training_sha256 != identity:
+    stored = StoredPolicy.open(folder)
+    found = stored.settings
+    if found.training_sha256 != own.training_sha256:
         raise BadConfig(f"{folder} holds a policy of other data or settings; choose another to=, or delete it")
+    free = ("weights_sha256", "versions", *(["epochs"] if limit else []))
+    wrong = [f.name for f in fields(own) if f.name not in free and getattr(found, f.name) != getattr(own, f.name)]
+    wrong += [name for name, array in arrays.items() if not _alike(stored.arrays.get(name), array)]
+    if wrong:
+        raise BadConfig(f"{folder} has another {wrong[0]} than this training gives; delete it to train again")
     return found
+
+
+def _alike(one: NDArray[np.float32] | None, other: NDArray[np.float32]) -> bool:
+    """Whether two arrays are the same up to rounding."""
+    return one is not None and one.shape == other.shape and np.allclose(one, other, ROUNDING, ROUNDING, equal_nan=True)
 
 
 def _check_unfinished(folder: Path, path: Path) -> None:

@@ -144,6 +144,8 @@ def baselines(task: Task) -> dict[str, dict[str, Baseline]]:
     """The baselines of every axis by name: of two rows about one, that with more twins; and the task's learner."""
     found: dict[str, dict[str, Baseline]] = {axis: {} for axis in task.axes}
     for row in (*ledger.newest("axis", task.name), *ledger.newest("belief", task.name)):
+        if row.split not in found:  # an axis of an earlier version
+            continue
         for one in map(Baseline.of_record, row.value["baselines"]):
             known = found[row.split].get(one.name)
             if known is None or one.twins >= known.twins:

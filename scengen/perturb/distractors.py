@@ -3,7 +3,7 @@
 A scene that may have them is compiled with spare geoms, which are invisible, have no mass and do not collide.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -45,6 +45,13 @@ def with_spares(look: Look) -> Look:
             spare.rgba = np.zeros(4, np.float32)
 
     return replace(look, change=change)
+
+
+def spare_elements() -> Iterator[dict[str, str]]:
+    """Attributes of the spare geoms in MJCF, for scenes that other programs compile."""
+    for number in range(SPARES):
+        unseen = {"pos": "0 0 -1", "rgba": "0 0 0 0", "group": "1", "contype": "0", "conaffinity": "0", "mass": "0"}
+        yield {"name": f"{SPARE}{number}", "type": "sphere", "size": f"{HALF[0]}", **unseen}
 
 
 def spares(model: mujoco.MjModel) -> list[int]:

@@ -7,7 +7,7 @@ from functools import cache
 from ..errors import BadConfig, UnknownName
 from ..samplers.task_files import conf_dir
 from ..work.plain import read_yaml
-from .effects import EFFECTS, OBJECTS, PICTURES, PROPRIOCEPTION, WRENCH, Effect, is_among
+from .effects import CONTROL, EFFECTS, OBJECTS, PICTURES, PROPRIOCEPTION, WRENCH, Effect, is_among
 
 LEVELS = 5
 """Number of levels of each kind."""
@@ -55,6 +55,11 @@ def kinds() -> Mapping[str, Kind]:
     return found
 
 
+def perceived() -> Mapping[str, Kind]:
+    """The kinds that change what is perceived and leave the physics alone: all but the conditions of control."""
+    return {name: kind for name, kind in kinds().items() if kind.effect.reads != CONTROL}
+
+
 def kind_of(name: str) -> Kind:
     """The kind of this name.
 
@@ -75,7 +80,7 @@ def stream_kind(stream: str) -> str:
     """Which kind of reading a stream is."""
     if "force_torque" in stream:
         return WRENCH
-    own = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "gripper_qpos")
+    own = ("eef_pos", "eef_quat", "joint_pos", "joint_vel", "joint_acc", "gripper_qpos", "gripper_qvel")
     if stream.startswith("robot") and stream.endswith(own):
         return PROPRIOCEPTION
     return "" if "tactile" in stream else OBJECTS

@@ -15,6 +15,8 @@ from ..episode import STRICT, Actions, Episode, Rules
 from ..errors import UnknownName
 from ..look.looks import ROOM, Look
 from ..means import MISSED, OPEN, SHOWN
+from ..perturb.drawn import Drawn
+from ..perturb.perturbation import Perturbation
 from ..pool import PoolRow
 from ..scenario import Scenario
 from ..sim.world import World
@@ -29,6 +31,8 @@ WITNESS = "witness"
 """Name of the actions of the witness, in place of a shortcut's."""
 COLUMNS = 4
 """Number of pictures in a row of a strip."""
+POLICY_CAMERA = "agentview"
+"""Camera of perturbed films that name none: perturbations change what policies see, and none sees a fitted view."""
 FRAMED = 12
 """Number of moments of a video over which the clearest view is chosen."""
 Progress = Callable[[int, int], None]
@@ -47,6 +51,10 @@ class Take:
     look: Look = field(default=ROOM, kw_only=True)
     directions: Directions = field(default=VIEWS, kw_only=True)
     """Directions of the views to choose from."""
+    perturbation: Perturbation = field(default=Perturbation(()), kw_only=True)
+    """Perturbation of the pictures, which then are those that a policy sees."""
+    perturb_seed: int = field(default=0, kw_only=True)
+    """Seed of the perturbation."""
 
     @classmethod
     def witness(cls, row: PoolRow, scenario: Scenario) -> "Take":
@@ -65,7 +73,37 @@ class Take:
             NoPictures: pictures of it cannot be made here.
         """
         check_pictures()
-        return World.load(self.scene_xml, self.embodiment, self.look)
+        world = World.load(self.scene_xml, self.embodiment, self.perturbation.dressed(self.look))
+        self.drawn.on_model(world.model)
+        return world
+
+    @cached_property
+    def drawn(self) -> Drawn:
+        """What is drawn for its perturbation."""
+        return self.perturbation.of(self.scenario.id, self.perturb_seed)
+
+    def camera(self, name: str | None, width: int, height: int) -> str | None:
+        """The camera that films it, given the requested one; None for the fitted view.
+
+        Raises:
+            BadConfig: a perturbation does not show in its pictures, or pictures of this size cannot be turned.
+        """
+        if not self.perturbation:
+            return name
+        self.perturbation.check((), [name or POLICY_CAMERA], self.look)
+        self.scenario.orientation.check_size(width, height)
+        return name or POLICY_CAMERA
+
+    def shown(self, eye: Camera, camera: str | None, period: int) -> Picture:
+        """A picture of the present world, as a policy sees it in a control period if it is perturbed."""
+        picture = eye.take(camera)
+        if not self.perturbation or camera is None:
+            return picture
+        return self.drawn.on_picture(self.scenario.orientation.apply(picture).copy(), camera, period)
+
+    def exposed(self, periods: Iterable[int]) -> list[int]:
+        """Control periods in which the pictures are taken that are seen in some control periods."""
+        return [max(0, period - round(self.drawn.delay / Loop.PERIOD)) for period in periods]
 
     def moments(self, world: World, periods: Iterable[int]) -> Iterator[str]:
         """Replay the actions, stop after each of these numbers of control periods, and yield time and outcome."""
@@ -170,15 +208,19 @@ def strip(
         NoPictures: OpenGL is missing.
         UnknownName: there is no such camera.
     """
-    pictures: list[Picture] = []
+    pictures, periods, camera = list[Picture](), take.even(frames), take.camera(camera, width, height)
     with closing(Camera(take.world(), width, height)) as eye:
-        moments = [(eye.world.state(), caption) for caption in take.moments(eye.world, take.even(frames))]
+        exposed = take.exposed(periods)
+        visited = sorted({*periods, *exposed})
+        captions, states = {}, {}
+        for period, captions[period] in zip(visited, take.moments(eye.world, visited), strict=True):
+            states[period] = eye.world.state()
         if camera is None:
-            eye.frame([state for state, _ in moments], take.directions)
+            eye.frame([states[period] for period in periods], take.directions)
         ways = take.ways
-        for state, caption in moments:
-            eye.world.restore(state)
-            pictures.append(captioned(eye.take(camera), caption))
+        for period, when in zip(periods, exposed, strict=True):
+            eye.world.restore(states[when])
+            pictures.append(captioned(take.shown(eye, camera, period), captions[period]))
             progress(len(pictures), frames)
     columns = min(COLUMNS, frames)
     blank = np.full_like(pictures[0], 255)
@@ -221,6 +263,7 @@ def movie(
         BadConfig: the file cannot be written.
     """
     periods_between(fps)  # before a file is started
+    camera = take.camera(camera, width, height)
     with (
         closing(Camera(take.world(), width, height)) as eye,
         appearing(path, folder=False) as part,
@@ -260,6 +303,7 @@ def inline(
         NoPictures: OpenGL is missing.
         UnknownName: there is no such camera.
     """
+    camera = take.camera(camera, width, height)
     with closing(Camera(take.world(), width, height)) as eye:
         first, *others = map(Image.fromarray, _frames(take, eye, fps, camera, progress))
     buffer = io.BytesIO()
@@ -273,9 +317,9 @@ def _frames(take: Take, eye: Camera, fps: int, camera: str | None, progress: Pro
     periods = range(0, len(take.actions) + 1, periods_between(fps))
     if camera is None:
         eye.frame([eye.world.state() for _ in take.moments(eye.world, take.even(FRAMED))], take.directions)
-    for number, _ in enumerate(take.moments(eye.world, periods), 1):
-        yield eye.take(camera)
-        progress(number, len(periods))
+    for number, _ in enumerate(take.moments(eye.world, take.exposed(periods))):
+        yield take.shown(eye, camera, periods[number])
+        progress(number + 1, len(periods))
 
 
 def periods_between(fps: int) -> int:

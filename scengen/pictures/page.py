@@ -2,6 +2,7 @@
 
 import jinja2
 
+from ..look.looks import ROOM, Look
 from ..validate.playable import check_scene
 from . import render
 from .views import VIEWS, Directions
@@ -17,13 +18,13 @@ def template(name: str) -> jinja2.Template:
     return jinja2.Environment(loader=loader, autoescape=True).get_template(name)
 
 
-def thumbnail(scene_xml: str, embodiment: str, directions: Directions = VIEWS) -> str:
+def thumbnail(scene_xml: str, embodiment: str, directions: Directions = VIEWS, look: Look = ROOM) -> str:
     """A picture of the start of a scenario, as a data address for HTML.
 
     Args:
         directions: those of the views to choose from.
     """
     check_scene(scene_xml, embodiment)
-    with render.camera(scene_xml, embodiment) as view:
+    with render.camera(scene_xml, embodiment, look=look) as view:
         view.frame(directions=directions)
         return render.address(render.encode(view.take()), "webp")

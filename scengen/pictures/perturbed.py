@@ -15,7 +15,7 @@ from ..pool import PoolRow
 from ..scenario import Scenario
 from ..validate.playable import stored_world
 from .film import Progress, captioned
-from .render import Camera, Picture
+from .render import Camera, Picture, check_pictures
 
 
 @contextmanager
@@ -33,6 +33,34 @@ def changed_by(drawn: Drawn, eye: Camera) -> Iterator[Mapping[str, NDArray[np.in
 def shows(kind: Kind, camera: str, look: Look) -> bool:
     """Whether a single picture of a camera shows a kind."""
     return affects(kind.effect, camera) and look.name in kind.effect.looks and not kind.effect.is_late
+
+
+class Start:
+    """The start of a scenario in front of the cameras of a policy, clean or perturbed."""
+
+    def __init__(self, row: PoolRow, scenario: Scenario, look: Look, size: int):
+        """
+        Args:
+            look: look of the pictures.
+            size: width and height of the pictures [pixels].
+
+        Raises:
+            NoPictures: OpenGL is missing.
+        """
+        check_pictures()  # before the meshes of the robot, which take a part of the address space
+        self.row, self.scenario, self.look = row, scenario, look
+        self._eye = Camera(stored_world(row, with_spares(look)), size, size)
+
+    def picture(self, camera: str, drawn: Drawn | None = None) -> Picture:
+        """A picture of a camera, given robosuite's name, under what a perturbation drew."""
+        if drawn is None:
+            self._eye.world.reset()
+            return self.scenario.orientation.apply(self._eye.take(camera)).copy()
+        with changed_by(drawn, self._eye):
+            return drawn.on_picture(self.picture(camera), camera, 0)
+
+    def close(self) -> None:
+        self._eye.close()
 
 
 def sheet(
@@ -55,18 +83,11 @@ def sheet(
     """
     shown = [kind for kind in kinds if shows(kind, camera, look)]
     levels = [Perturbation(((kind.name, level),)) for kind in shown for level in range(1, LEVELS + 1)]
-    pictures, world = list[Picture](), stored_world(row, with_spares(look))
-    with closing(Camera(world, size, size)) as eye:
-
-        def taken() -> Picture:
-            world.reset()
-            return scenario.orientation.apply(eye.take(camera)).copy()
-
-        clean = taken()
+    pictures = list[Picture]()
+    with closing(Start(row, scenario, look, size)) as start:
+        clean = start.picture(camera)
         for perturbation in levels:
-            drawn = perturbation.of(row.id, seed)
-            with changed_by(drawn, eye):
-                picture = drawn.on_picture(taken(), camera, 0)
+            picture = start.picture(camera, perturbation.of(row.id, seed))
             pictures.append(captioned(picture, str(perturbation)))
             progress(len(pictures), len(levels))
     first = captioned(clean, "clean")

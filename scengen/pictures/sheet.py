@@ -8,6 +8,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from ..certificate import STAGES
+from ..look.looks import ROOM, Look
 from ..pool import Pool, PoolRow
 from ..samplers.axis import spell
 from ..samplers.task import Task
@@ -62,6 +63,7 @@ def contact_sheet(
     images: int,
     films: bool,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    look: Look = ROOM,
 ) -> str:
     """Write one HTML file that shows the scenes of some pools. Returns a remark, or an empty text.
 
@@ -73,6 +75,7 @@ def contact_sheet(
         images: largest number of scenarios to show of each pool; fewer if the page would become too large.
         films: whether to show each of them with a film strip of the witness.
         progress: function that gets the number of drawn scenarios and the number of all.
+        look: look of the pictures.
 
     Raises:
         ScengenError: a scene or a witness cannot be played.
@@ -89,10 +92,10 @@ def contact_sheet(
                     if not section.figures:
                         directions = directions_of(pool, task)
                     if row.shifted:
-                        entry.twin, entry.picture = pair(row, twin_scene(pool, task, row), directions)[:2]
+                        entry.twin, entry.picture = pair(row, twin_scene(pool, task, row), directions, look)[:2]
                     else:
-                        entry.picture = thumbnail(row.scene_xml, row.embodiment, directions)
-                    entry.strip = _strip(task, row, directions) if films else ""
+                        entry.picture = thumbnail(row.scene_xml, row.embodiment, directions, look)
+                    entry.strip = _strip(task, row, directions, look) if films else ""
                 except render.NoPictures as error:
                     remark = str(error)
             section.checks.extend([] if section.checks else entry.checks)
@@ -110,9 +113,9 @@ def contact_sheet(
     return remark
 
 
-def _strip(task: Task, row: PoolRow, directions: Directions) -> str:
+def _strip(task: Task, row: PoolRow, directions: Directions, look: Look) -> str:
     """Film strip of the witness."""
-    take = replace(film.Take.witness(check_row(row), task.scenario(row.params)), directions=directions)
+    take = replace(film.Take.witness(check_row(row), task.scenario(row.params)), directions=directions, look=look)
     return render.address(render.encode(film.strip(take, *STRIP)), "webp")
 
 

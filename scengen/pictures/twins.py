@@ -8,7 +8,7 @@ import numpy as np
 from mujoco import MjvCamera
 
 from ..geometry import Vec3
-from ..look.looks import ROOM
+from ..look.looks import ROOM, Look
 from ..pool.row import SceneRow
 from ..sim.world import World
 from ..validate.playable import check_scene, stored_world
@@ -26,7 +26,7 @@ MIN_ADVANTAGE = 1.2
 """Factor by which another view must show more than the first one to be chosen."""
 
 
-def pair(row: SceneRow, twin_scene: str, directions: Directions) -> tuple[str, str, Directions]:
+def pair(row: SceneRow, twin_scene: str, directions: Directions, look: Look = ROOM) -> tuple[str, str, Directions]:
     """Pictures of the training twin and of a scenario as data addresses for HTML, and the direction of both.
 
     Args:
@@ -40,7 +40,7 @@ def pair(row: SceneRow, twin_scene: str, directions: Directions) -> tuple[str, s
     """
     check_scene(row.scene_xml, row.embodiment)
     check_pictures()  # before the meshes of the robots, which take a part of the address space
-    worlds = World.load(twin_scene, row.embodiment, ROOM), stored_world(row, ROOM)
+    worlds = World.load(twin_scene, row.embodiment, look), stored_world(row, look)
     view = comparison_view(worlds, PICTURE[0] / PICTURE[1], directions)
     twin, here = (address(encode(each), "webp") for each in twin_pictures(*worlds, size=PICTURE, view=view))
     return twin, here, [(view.azimuth, view.elevation)]

@@ -13,7 +13,7 @@ import viser
 
 from .. import compose
 from ..errors import BadConfig, Infeasible, ScengenError
-from ..look.looks import PLAIN
+from ..look.looks import ROOM
 from ..pictures import film
 from ..pictures.render import Picture, camera, encode
 from ..pictures.sheet import moved
@@ -37,7 +37,7 @@ from .films import record
 
 DESCRIPTION = "made.json"
 """File that describes what was made. It is written last: without it the folder is not whole."""
-FORMAT = 1
+FORMAT = 2
 """Number of the format of exhibits; another one makes all of them again."""
 SEED = 0
 """Seed of the scenarios that are drawn for the site."""
@@ -224,7 +224,7 @@ def _certified(task: Task) -> PoolRow:
 
 def _clip(task: Task, row: PoolRow, title: str, folder: Path, stem: str) -> Clip:
     """The film of a witness or of a shortcut."""
-    scenario, world, horizon = task.scenario(row.params), stored_world(row, PLAIN), row.horizon
+    scenario, world, horizon = task.scenario(row.params), stored_world(row, ROOM), row.horizon
     actions = row.witness
     if title != film.WITNESS:
         take, _ = film.shortcut(row, scenario, title)
@@ -242,7 +242,7 @@ def _pair(task: Task, axis: Axis, folder: Path, stem: str) -> Pair:
     if not draws:
         return Pair(axis.name, "", [], False)
     scenarios = [task.draw(ID, SEED, index).scenario, *(draw.scenario for draw in draws)]
-    worlds = [World.load(rebuild(scenario), task.embodiment, PLAIN) for scenario in scenarios]
+    worlds = [World.load(rebuild(scenario), task.embodiment, ROOM) for scenario in scenarios]
     pictures = twin_pictures(*worlds, size=TWIN, view=comparison_view(worlds, TWIN[0] / TWIN[1]))
     files = [f"{stem}-{number}.webp" for number in range(len(pictures))]
     for name, picture in zip(files, pictures, strict=True):

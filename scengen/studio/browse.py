@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from ..geometry import Vec3
-from ..look.looks import PLAIN
+from ..look.looks import ROOM
 from ..pictures import film
 from ..pictures.page import template
 from ..pictures.shared_view import twin_scene
@@ -20,6 +20,7 @@ from ..sim.world import World
 from ..validate.playable import check_row, stored_world
 from .player import Player
 from .scene import FAULTS, SceneView, filmed, one_line
+from .seen import Seen
 
 TWIN_OFFSET: Vec3 = np.array([0.0, 1.4, 0.0])
 """Position of the training twin, at the side of the scenario [m]: the table is 0.8 m wide."""
@@ -42,6 +43,8 @@ class Shelf:
     pools: Sequence[Pool]
     tasks: Mapping[str, Task]
     """Tasks by the folders of the pools."""
+    search: tuple[str, ...] = ()
+    """Overrides that add folders of other packages, see `task_files.search_path`."""
 
     def label(self, number: int) -> str:
         """Name of a pool for people."""
@@ -80,6 +83,8 @@ class Browser:
         self._what: viser.GuiDropdownHandle[str] = gui.add_dropdown("play", [str(film.WITNESS)])
         self.player = Player(client, self._view)
         """The controls of the film."""
+        self.seen = Seen(client, shelf.search)
+        """What a policy sees."""
         self._about = gui.add_html("")
         self._label: viser.LabelHandle | None = None
         self._sight = CAMERA
@@ -108,6 +113,7 @@ class Browser:
 
     def close(self) -> None:
         self.player.close()
+        self.seen.close()
 
     def _turned_to(self, place: int) -> None:
         self._place.max = max(1, len(self.pool))
@@ -132,6 +138,7 @@ class Browser:
             return
         self._shown = (str(self.pool.folder), place)
         self.player.unload()
+        self.seen.show(None)
         self._row = self._world = None  # if anything below fails, the page shows nothing of another scenario
         with self._client.atomic():
             self._view.clear()
@@ -141,14 +148,16 @@ class Browser:
         self._about.content = self._description(row, best)  # what is read is shown before what is simulated
         self.player.outcome.content = template("studio_fault.html").render(note="trying the scene ...")
         check_row(row)
-        self._row, self._world = row, stored_world(row, look=PLAIN)
+        self._row, self._world = row, stored_world(row, look=ROOM)
         with self._client.atomic():
             self._view.show(self._world)
-        shortcuts = self.task.scenario(row.params).shortcuts()
+        scenario = self.task.scenario(row.params)
+        shortcuts = scenario.shortcuts()
         self._what.options = (film.WITNESS, *sorted(shortcuts, key=lambda name: name != best))
         self._what.value = film.WITNESS
         self._show_twin()
         self._play(play=False)
+        self.seen.show(row, scenario)
 
     def _show_twin(self) -> None:
         """Show or hide the training twin, which a scenario of training does not have."""
@@ -162,7 +171,7 @@ class Browser:
                 self._look(CAMERA, LOOK_AT)
                 return
             self._look(CAMERA_FOR_TWO, LOOK_AT_FOR_TWO)
-            world = World.load(twin_scene(self.pool, self.task, row), self.task.embodiment, look=PLAIN)
+            world = World.load(twin_scene(self.pool, self.task, row), self.task.embodiment, look=ROOM)
             self._twin.show(world, TWIN_OFFSET, robot=False)
             self._label = self._client.scene.add_label("/twin_label", "training twin", position=LABEL_OFFSET)
 

@@ -19,7 +19,7 @@ from ..demos.teleop.pad import CONNECTED, CONTROLS, PadEvent
 from ..demos.teleop.session import Session, StateLine
 from ..envs.observations import turns_pictures
 from ..errors import ScengenError
-from ..look.looks import PLAIN
+from ..look.looks import ROOM
 from ..pictures.page import template
 from ..pictures.render import Picture
 from ..pool.untrusted import Malformed, read_json
@@ -249,7 +249,7 @@ class DrivePage:
             with self._client.atomic():
                 if state.session is not self._shown:
                     stage, self._shown = state.session.stage, state.session
-                    self._view.show(World.load(stage.scene_xml, stage.embodiment, look=PLAIN))
+                    self._view.show(World.load(stage.scene_xml, stage.embodiment, look=ROOM))
                 self._view.move(state.poses)
                 if time.monotonic() >= due or (state.line.phase, state.told) != said:
                     due, said = time.monotonic() + LINE_PERIOD, (state.line.phase, state.told)

@@ -16,7 +16,7 @@ from ..demos.curate.page import plot
 from ..demos.curate.people import Decision, write_decision, write_score
 from ..export.dataset import EpisodeData, Recording, rules_of
 from ..export.recording import CONTROL_ACTIONS
-from ..look.looks import PLAIN
+from ..look.looks import ROOM
 from ..pictures.page import template
 from ..pool.untrusted import read_json
 from ..sim.world import World
@@ -155,7 +155,7 @@ class Judge:
         """Replay the episode's actions in the scene of its parameters."""
         task = compose.load_task(episode.task, self._desk.search)
         scenario = task.scenario(read_json(str(episode.about["scengen/params"])))
-        world = World.load(rebuild(scenario), task.embodiment, look=PLAIN)
+        world = World.load(rebuild(scenario), task.embodiment, look=ROOM)
         with self._client.atomic():
             self._view.show(world)
         periods = episode.columns[CONTROL_ACTIONS]

@@ -28,6 +28,8 @@ FACES = {
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): 1280,
 }
 """Numbers of triangles of geoms that are not meshes, by type."""
+NO_COLOUR = (0.5, 0.5, 0.5, 1.0)
+"""Colour of geoms that take the colour of their material."""
 SHOWN_GROUPS = 3
 """Number of MuJoCo's geom groups that are shown, from 0: those of pictures."""
 GRID = 2.0**-12
@@ -232,9 +234,17 @@ def _shown(model: mujoco.MjModel, body: int) -> Iterator[int]:
 
 
 def _colour(model: mujoco.MjModel, geom: int) -> NDArray[np.float32]:
-    """Colour of a geom, RGBA."""
-    material = int(model.geom_matid[geom])
-    return model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+    """Colour of a geom as MuJoCo shows it, with the mean of its texture, RGBA."""
+    material, colour = int(model.geom_matid[geom]), model.geom_rgba[geom].copy()
+    if material < 0:
+        return colour
+    if (colour == NO_COLOUR).all():
+        colour = model.mat_rgba[material].copy()
+    if (texture := model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB]) >= 0:
+        start, channels = model.tex_adr[texture], model.tex_nchannel[texture]
+        size = model.tex_height[texture] * model.tex_width[texture] * channels
+        colour[:3] *= model.tex_data[start : start + size].reshape(-1, channels)[:, :3].mean(axis=0) / 255.0
+    return colour
 
 
 def _faces(model: mujoco.MjModel, geom: int) -> int:

@@ -1,6 +1,7 @@
 """Stage 3: primitives solve tasks through the filter and the controller, and what cannot be carried out is told."""
 
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,6 +16,7 @@ from scengen.agents.primitives import BadCall, primitive, tools
 from scengen.agents.runner import AgentSettings, run
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig
+from scengen.perturb.language import Words
 
 BASE = Path(__file__).parents[1] / "checker" / "base"
 """Stored pools of the checker, with one scenario each."""
@@ -162,3 +164,25 @@ def test_the_gripper_keeps_its_last_command():
             env.step(action)
     assert env.world.arm.grip == 1.0 and env.world.arm.gap < 0.005
     env.close()
+
+
+def test_a_perturbed_robot_feels_and_remembers_with_the_same_error(tmp_path, monkeypatch):
+    scripts = [("CloseGripper", {}), ("CloseGripper", {})]
+    clean, biased = Scripted(*scripts), Scripted(*scripts)
+    played(tmp_path / "clean", monkeypatch, clean)
+    (result,) = played(tmp_path / "biased", monkeypatch, biased, perturb="proprioception_bias@5+terse@2")
+
+    def read(prompt):
+        felt, told = (
+            [float(each) for each in re.search(pattern, prompt)[1].replace(",", " ").split()]
+            for pattern in (r"robot0_eef_pos \[([^]]*)\]", r"hand at \(([^)]*)\)")
+        )
+        return np.array([felt, told])
+
+    without, with_bias = read(clean.prompts[1]), read(biased.prompts[1])
+    bias = result["about"]["perturb"]["proprioception_bias"]["bias"]
+    assert np.abs(np.abs(with_bias - without) - bias).max() < 2e-3 < bias
+    assert np.abs(with_bias[0] - with_bias[1]).max() < 2e-3 and np.abs(without[0] - without[1]).max() < 2e-3
+    text = Words.of("domino_single", "").wordings["terse"][1]
+    assert text in biased.prompts[0] and text not in clean.prompts[0]
+    assert result["perturbation"] == "proprioception_bias@5+terse@2"

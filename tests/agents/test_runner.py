@@ -1,5 +1,6 @@
 """Runs: stand-ins get what they must, nothing is asked twice, budgets stop, and a run is graded again for nothing."""
 
+import hashlib
 import json
 
 import helpers
@@ -11,7 +12,11 @@ from scengen.agents import runner
 from scengen.agents.replies import FormatError, read_json
 from scengen.agents.runner import AgentSettings, run
 from scengen.agents.tables import by_question, lost_in_twins
+from scengen.envs.gym import PoolEnv
+from scengen.envs.observations import cameras_of
 from scengen.errors import ScengenError
+from scengen.perturb.language import Words
+from scengen.pictures.render import encode
 from scengen.tasks.domino_single import DominoSingle
 
 REFERENCE = str(helpers.REFERENCE)
@@ -137,6 +142,34 @@ def test_pictures_of_all_cameras_and_moments_are_sent_and_kept(tmp_path):
     assert all((tmp_path / "pictures" / f"{name}.jpg").read_bytes()[:2] == b"\xff\xd8" for name in names)
 
 
+@pytest.mark.skipif(not helpers.pictures_are_possible(), reason="no OpenGL")
+def test_a_perturbed_model_gets_the_pictures_and_the_instruction_of_the_environment(tmp_path, capsys):
+    perturb, size = "light_colour@5+patch@3+foreign@2", {"width": 48, "moments": 1, "pictures": True}
+    (result,) = played(tmp_path, "facts", seeds=1, stage=1, perturb=perturb, perturb_seed=4, **size).results
+    (call,) = calls(tmp_path)
+    cameras = [*cameras_of("panda_jaw")]
+    env = PoolEnv("domino_single", REFERENCE, cameras, width=48, height=48, perturb=perturb, perturb_seed=4)
+    observation, _ = env.reset(options={"scenario": result["scenario"]})
+    seen = {hashlib.sha256(encode(observation[name], "jpeg")).hexdigest()[:16] for name in cameras}
+    assert {*call["turns"][1]["pictures"]} == seen and env.instruction in call["turns"][1]["text"]
+    assert "light_colour" not in call["turns"][1]["text"]
+    assert call["about"]["perturb"] == result["about"]["perturb"] == env.drawn.plain()
+    assert result["perturbation"] == perturb and result["about"]["perturb_seed"] == 4
+    env.close()
+    assert cli.run(["agent", "report", f"to={tmp_path}"]) == 0, "graded again under the same perturbation"
+    told = "facts under light_colour@5+patch@3+foreign@2"
+    assert told in capsys.readouterr().out and told in (tmp_path / "report.html").read_text()
+    assert json.loads((tmp_path / "table-1.json").read_text())["perturbation"] == perturb
+    played(tmp_path, "facts", seeds=1, stage=1, **size)
+    assert len(calls(tmp_path)) == 2, "the clean scene is another call"
+
+
+def test_a_task_without_other_wordings_is_refused_before_anything_is_asked(tmp_path, monkeypatch):
+    monkeypatch.setattr(Words, "of", lambda task, instruction, search: Words(task, instruction))
+    with pytest.raises(ScengenError, match="domino_single has no other wordings"):
+        runner.works(settings(tmp_path, "facts", perturb="vague@1"))
+
+
 def test_a_dry_run_writes_prompts_and_asks_nothing(tmp_path, capsys):
     said = [f"pool={REFERENCE}", "seeds=2", "pictures=false", "model=facts", f"to={tmp_path}", "dry=true"]
     assert cli.run(["agent", *said]) == 0
@@ -152,6 +185,10 @@ def test_a_dry_run_writes_prompts_and_asks_nothing(tmp_path, capsys):
         ({"temperatures": [3.0]}, "temperatures"),
         ({"mode": "look"}, "did you mean|known: poses"),
         ({"seeds": 0}, "seeds = 0"),
+        ({"perturb": "noise"}, "give noise a level from 1 to 5"),
+        ({"perturb": "noise@1"}, "affects all cameras, and none is observed"),
+        ({"perturb": "object_noise@1", "mode": "poses", "stage": 3}, "affects streams of object-state"),
+        ({"perturb": "terse@1", "perturb_seed": -1}, "perturb_seed = -1"),
     ],
 )
 def test_bad_input_is_one_line(tmp_path, changes, says):

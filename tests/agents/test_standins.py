@@ -25,7 +25,7 @@ def exams(name, split, model):
         labels = {"task": name, "split": split, "index": index, "id": scenario.id}
         row = SimpleNamespace(**labels, instruction=task.instruction, embodiment=task.embodiment)
         stand_in = STAND_INS[model](Key(found, sheet.plan, fixed))
-        yield Exam(row, sheet, found, View({}, ("0.0 s: at rest",)), 0.0, stand_in)
+        yield Exam(row, row.instruction, sheet, found, View({}, ("0.0 s: at rest",)), 0.0, stand_in)
 
 
 def results(name, model, folder):

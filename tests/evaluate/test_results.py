@@ -1,6 +1,8 @@
 """Results that prove what was run: a forged line is found, or what cannot be known of it is said."""
 
+import contextlib
 import json
+import os
 import random
 import shutil
 from dataclasses import replace
@@ -9,12 +11,15 @@ import helpers
 import pytest
 
 from scengen import cli
+from scengen.errors import BadConfig, PoolError, ScengenError
 from scengen.evaluate.audit import _Audit, audit
 from scengen.evaluate.audit_report import Options
 from scengen.evaluate.comparison import TABLE, Comparison
 from scengen.evaluate.lines import COLUMNS, RUN, EpisodeLine, picture_digest, read_lines, renewed, schema
 from scengen.evaluate.rollouts import order
+from scengen.evaluate.stored import stored_results
 from scengen.look.looks import LOOKS
+from scengen.pool.demonstrations import DEMONSTRATIONS
 from scengen.tasks.domino_single import DominoSingle
 
 REFERENCE = str(helpers.REFERENCE)
@@ -46,7 +51,7 @@ def write_lines(folder, lines):
 def cover_up(folder, lines):
     """Write lines with right numbers and hashes, and the tables that they give, as a careful forger does."""
     write_lines(folder, renewed(json.loads((folder / RUN).read_text()), lines))
-    one = _Audit(folder, json.loads((folder / TABLE).read_text()), ONE)
+    one = _Audit(folder, stored_results(folder)[1][0], ONE)
     for path, text in Comparison([one.result]).files(folder).items():
         path.write_text(text)
 
@@ -171,6 +176,103 @@ def test_another_figure_in_a_file_is_found(results, tmp_path, name):
     text = (folder / name).read_text()
     (folder / name).write_text(text.replace('"low": 0.0', '"low": 0.1') if name == TABLE else text.replace("0", "7", 1))
     assert verdict(folder, ONE).verdict == "refuted"
+
+
+def edit(results_folder, name, **entries):
+    """Change entries of a file, and let hashes and tables follow."""
+    path = results_folder / name
+    path.write_text(json.dumps({**json.loads(path.read_text()), **entries}))
+
+
+@pytest.mark.parametrize(
+    ("entries", "says"),
+    [
+        ({"width": 64}, "says width = 64, run.json has 256"),
+        ({"action_repeat": 1}, "says action_repeat = 1, run.json has 10"),
+        ({"observations": ["force_torque"]}, "says observations"),
+        ({"settle": False}, "says settle = False"),
+        ({"keep": ["episodes"]}, "says keep"),
+        ({"arms": ["blind"]}, "has the arms [], its settings give ['blind']"),
+        ({"edition": "v1"}, "names edition v1: "),
+        ({"tasks": "packing"}, "and no edition"),
+        ({"rollouts": 10**6}, "says rollouts = 1000000, and there are 12 lines"),
+    ],
+)
+def test_settings_of_the_table_that_contradict_the_run_are_found(results, tmp_path, entries, says):
+    folder = forged(results, tmp_path, "bare", lines_of(results / "bare"), False)
+    told = json.loads((folder / TABLE).read_text())["settings"]
+    edit(folder, TABLE, settings={**told, **entries})
+    assert any(says in fault for fault in verdict(folder, ONE).faults)
+
+
+def test_a_table_about_other_episodes_than_those_beside_it_is_refused(results, tmp_path):
+    """Else false lines would be sound because honest ones are somewhere else."""
+    folder = forged(results, tmp_path, "bare", lines_of(results / "bare"), False)
+    for elsewhere in (str(results / "bare"), "../other", "there/../..", "nowhere"):
+        edit(folder, TABLE, folder=elsewhere)
+        with pytest.raises(BadConfig, match="which is no folder beside it"):
+            verdict(folder, ONE)
+
+
+STRANGE = (
+    None,
+    5,
+    -1.5,
+    True,
+    "x",
+    [],
+    [[]],
+    [{}],
+    [None],
+    {"x": 5},
+    {"x": None},
+    {"domino_single": {}},
+    {REFERENCE: 1},
+)
+
+
+@pytest.mark.parametrize("name", [RUN, TABLE])
+def test_entries_of_any_type_are_refused_in_order(results, tmp_path, name):
+    folder = forged(results, tmp_path, "bare", lines_of(results / "bare"), False)
+    honest = json.loads((folder / name).read_text())
+    for key in (
+        honest if name == RUN else ("folder", "settings", "episodes_sha256", "lost", "arms", "benign", "policies")
+    ):
+        for value in STRANGE:
+            if value != honest.get(key):
+                (folder / name).write_text(json.dumps({**honest, key: value}))
+                with contextlib.suppress(ScengenError):
+                    assert verdict(folder, ONE).verdict != "sound" or value == [], (key, value)
+        (folder / name).write_text(json.dumps({k: v for k, v in honest.items() if k != key}))
+        with contextlib.suppress(ScengenError):
+            assert verdict(folder, ONE).verdict != "sound" or honest.get(key) in (None, []), key
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"\xe9", None])
+def test_tables_for_people_in_another_encoding_are_not_those_of_the_lines(results, tmp_path, content):
+    folder = forged(results, tmp_path, "bare", lines_of(results / "bare"), False)
+    (folder / "table.md").unlink()
+    os.mkfifo(folder / "table.md") if content is None else (folder / "table.md").write_bytes(content)
+    assert verdict(folder, ONE).faults == [f"{folder / 'table.md'} is not the one that its lines give"]
+
+
+def test_kept_actions_say_what_the_policy_perceived(results, tmp_path, capsys):
+    folder = forged(results, tmp_path, "kept", lines_of(results / "kept"), False)
+    changed = folder / "rollouts-proprioception_noise@2" / "reference"
+    assert cli.run(["verify", f"pool={changed}"]) == 0
+    assert "'random' drove the robot under 'proprioception_noise@2', seed 0" in capsys.readouterr().out
+    told = json.loads((changed / DEMONSTRATIONS).read_text())
+    assert "condition" not in json.loads((folder / "rollouts" / "reference" / DEMONSTRATIONS).read_text())
+    for entries, says in (
+        ({"condition": "proprioception_noise@1"}, "says condition = 'proprioception_noise@1'"),
+        ({"perturb_seed": 3}, "says perturb_seed = 3"),
+        ({"policy": "ours"}, "says policy = 'ours'"),
+    ):
+        (changed / DEMONSTRATIONS).write_text(json.dumps({**told, **entries}))
+        assert any(says in fault for fault in verdict(folder).faults)
+    (changed / DEMONSTRATIONS).write_text(json.dumps({k: v for k, v in told.items() if k != "perturb_seed"}))
+    with pytest.raises(PoolError, match="a condition"):
+        verdict(folder)
 
 
 def test_lines_have_the_schema(results):

@@ -15,6 +15,7 @@ from scengen.cli import run
 from scengen.errors import BadConfig
 from scengen.evidence import ledger, measuring
 from scengen.evidence.ledger import KINDS, Evidence
+from scengen.measures import figures
 from scengen.measures.measurement import Result, Row
 from scengen.measures.policies import MIXED
 from scengen.measures.scenarios import Certified
@@ -48,7 +49,7 @@ def test_every_file_is_about_a_task_and_every_row_is_whole(kind):
             assert row.split in ("", *splits)
             assert type(row.version) is int and 1 <= row.version <= version
             assert type(row.n) is int and row.n >= 1
-            assert type(row.value) is dict and row.value and type(row.made_with) is dict and row.made_with
+            assert isinstance(row.value, dict) and row.value and isinstance(row.made_with, dict) and row.made_with
 
 
 @pytest.mark.parametrize("name", sorted({row.task for row in ROWS}))
@@ -246,6 +247,51 @@ def test_a_row_that_no_measurement_writes_is_refused(changed, empty):
     path.write_text(path.read_text() + json.dumps({**asdict(ROW), "split": "diagonal", **changed}) + "\n")
     with pytest.raises(BadConfig, match="line 2: .*; restore the file"):
         ledger.read("plan", "domino_single")
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [('"n": 3', '"n": 3, "n": 4'), ("2", "NaN"), ("2", "1e999"), ("2", "[" * 99 + "]" * 99), ("2", r'"\ud800"')],
+)
+def test_a_row_that_is_no_strict_json_is_refused(changed, empty):
+    ledger.write(ROW)
+    path = empty / "plan" / "domino_single.jsonl"
+    path.write_text(
+        path.read_text().replace('"solved": 2', f'"solved": {changed[1]}')
+        if changed[0] == "2"
+        else path.read_text().replace(*changed)
+    )
+    with pytest.raises(BadConfig, match="line 1: .*; restore the file"):
+        ledger.read("plan", "domino_single")
+
+
+@pytest.mark.parametrize(
+    "value",
+    [{"solved": 2}, {"certified": "all", "indices": 4, "cpu": 1.0}, {"certified": -1, "indices": 4, "cpu": 1.0}],
+)
+def test_figures_that_commands_print_are_numbers(value, empty, capsys):
+    ledger.write(replace(ROW, kind="certified", value=value))
+    assert run(("tasks",)) == 2 and "line 1: value has certified = " in capsys.readouterr().err
+
+
+def test_rows_on_other_draws_are_not_told_as_measured(empty, capsys):
+    figures = {"certified": 4, "indices": 4, "cpu": 1.0}
+    honest = replace(ROW, kind="certified", value=figures)
+    for split, draws in (("id", ROW.draws), ("diagonal", "0" * 12), ("nowhere", ROW.draws)):
+        ledger.write(replace(honest, split=split, draws=draws))
+    assert run(("tasks", "task=domino_single", f"records={empty}")) == 0
+    told = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert " certified id 3 8 of 9: diagonal, " in told and "; on other draws: diagonal, nowhere" in told
+    assert f"claimed, and not checked: the figures of {empty}" in told
+
+
+def test_figures_that_a_row_lacks_are_named(empty):
+    ledger.write(replace(ROW, kind="belief", split="diagonal"))
+    with pytest.raises(BadConfig, match="a row of the ledger lacks baselines, it has solved"):
+        figures.baselines(TASK)
+    ledger.write(replace(ROW, kind="belief", split="diagonal", value={"baselines": []}))
+    ledger.write(replace(ROW, kind="belief", split="an_axis_of_an_earlier_version"))
+    assert not any(figures.baselines(TASK).values())
 
 
 def test_two_rows_of_the_same_place_and_files_that_are_none_are_refused(empty):

@@ -75,6 +75,29 @@ def test_a_finished_training_is_not_repeated_and_never_replaced(tmp_path):
         trained(tmp_path, epochs=7)
 
 
+@pytest.mark.parametrize(
+    "changed", [{"seed": 9}, {"task": "pull"}, {"rows": 10**6}, {"played": 1, "chunk": 2}, {"epochs": 60}]
+)
+def test_a_policy_with_other_settings_than_its_training_gives_is_not_called_the_same(tmp_path, changed):
+    trained(tmp_path, chunk=2, played=2)
+    stored = StoredPolicy.open(tmp_path)
+    StoredPolicy(replace(stored.settings, **changed), stored.arrays).write(tmp_path)
+    with pytest.raises(BadConfig, match=f"has another {next(iter(changed))} than this training gives; delete it"):
+        trained(tmp_path, chunk=2, played=2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "array"), [(BC, "input_mean"), (MIP, "output_scale"), (KNN, "inputs"), (KNN, "chunks")]
+)
+def test_arrays_that_follow_from_the_data_are_compared(tmp_path, kind, array):
+    """The other weights follow from the training alone, and the command says that they are claimed."""
+    trained(tmp_path, policy=kind)
+    stored = StoredPolicy.open(tmp_path)
+    StoredPolicy(stored.settings, {**stored.arrays, array: stored.arrays[array] + np.float32(0.01)}).write(tmp_path)
+    with pytest.raises(BadConfig, match=f"has another {array} than this training gives; delete it"):
+        trained(tmp_path, policy=kind)
+
+
 def test_an_unfinished_training_of_other_settings_is_not_replaced(tmp_path):
     def interrupt(done, total, told):
         raise KeyboardInterrupt

@@ -3,12 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from helpers import REFERENCE
 from hostile import PAYLOADS, corpus_texts
 from pools import make, rewritten
 from studios import running
 
+from scengen.envs.gym import PoolEnv
 from scengen.ood.analysis.redraw import task_of
 from scengen.pool import Pool
 
@@ -65,6 +67,48 @@ def test_browse_play_scrub_find_and_see_the_twin(chromium, opened, shifted, tmp_
         browser._what.value = browser._what.options[1]
         browser._run(browser._play)
         page.get_by_text(f"{browser._what.value}: ").wait_for()
+        assert not tab.faults
+
+
+def test_a_slider_shows_the_scene_under_every_level_of_a_perturbation(chromium, opened, tmp_path):
+    with running(content_of(REFERENCE)) as studio:
+        tab = opened(studio.address, size=(1280, 1200))
+        page = tab.page
+        page.get_by_text("witness: success at").wait_for()
+        (client,) = studio.server.get_clients().values()
+        seen = studio._pages[client.client_id].browser.seen
+
+        def choose(label, option):
+            page.get_by_label(label, exact=True).last.click()
+            page.get_by_role("option", name=option, exact=True).click()
+
+        assert not seen.image.visible, "nothing is drawn before it is asked for"
+        choose("perturbation", "clean")
+        tab.wait(lambda: seen.image.visible, "a clean picture")
+        clean = seen.image.image.copy()
+        choose("perturbation", "light_colour")
+        page.get_by_text("light_colour@3: ").wait_for()
+        third = seen.image.image.copy()
+        page.locator("[role=slider]").nth(1).focus()
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("ArrowRight")
+        page.get_by_text("light_colour@5: ").wait_for()
+        fifth = seen.image.image
+        away = [np.abs(each.astype(int) - clean).mean() for each in (third, fifth)]
+        assert 2 < away[0] < away[1]
+        page.screenshot(path=str(tmp_path / "seen.png"))
+        env = PoolEnv("domino_single", REFERENCE, "rgb_exo_right_cam", perturb="light_colour@5")
+        assert (env.reset(seed=0)[0]["rgb_exo_right_cam"] == fifth).all(), "as in the environment"
+        env.close()
+        choose("perturbation", "wrist_camera")
+        page.get_by_text("affects wrist cameras, and none is observed").wait_for()
+        choose("camera", "rgb_gripper_cam")
+        page.get_by_text("wrist_camera@5: ").wait_for()
+        choose("perturbation", "foreign")
+        page.get_by_text("推倒第一块").wait_for()
+        tab.press("next")
+        page.get_by_text(str([*Pool.open(REFERENCE).names()][1])).first.wait_for()
+        tab.wait(lambda: seen._drawn[0] == Pool.open(REFERENCE).at(1).id, "the next scenario")
         assert not tab.faults
 
 

@@ -15,9 +15,10 @@ from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 from scengen.envs.gym import PoolEnv, action_repeat_at
 from scengen.envs.lerobot import AGENT, ENVIRONMENT, PIXELS, ROLLOUT, LeRobotNames
 from scengen.envs.object_state import NAME
-from scengen.envs.observations import proprioception
+from scengen.envs.observations import ALL, cameras_of, proprioception
 from scengen.envs.pools import rows_of
 from scengen.errors import BadConfig
+from scengen.perturb.perturbation import Perturbation
 
 
 class EachOnce(gymnasium.Wrapper):
@@ -75,11 +76,22 @@ class ScengenEnv(EnvConfig):
     """Whether a reached goal must still hold after a second with the robot idle, as in `scengen evaluate`."""
     rules: str = "strict"
     """Rules of episodes: `strict`, or `paper`."""
+    perturb: str = ""
+    """Kinds of perturbation at their levels, such as `light_direction@3+noise@1`. The names of suites hold them."""
+    perturb_seed: int = 0
+    """Another number draws other perturbations for the same scenarios."""
 
     def __post_init__(self) -> None:
-        """Describe the observations, which depend on the pools."""
+        """Describe the observations, which depend on the pools.
+
+        Raises:
+            BadConfig: a perturbation affects nothing that the policy observes.
+        """
         if self.pool:
             space = self._environment(self._splits()[0], 0).observation_space
+            names, known = self.gym_kwargs["observations"], cameras_of(ALL)
+            seen = [known[name] for name in names if name in known]
+            Perturbation.parse(self.perturb).check([name for name in names if name not in known], seen)
             self.features = {ACTION: PolicyFeature(FeatureType.ACTION, self._action_shape())}
             self.features_map = {ACTION: ACTION}
             vectors = {AGENT: (FeatureType.STATE, OBS_STATE), ENVIRONMENT: (FeatureType.ENV, OBS_ENV_STATE)}
@@ -107,11 +119,13 @@ class ScengenEnv(EnvConfig):
             "height": self.height,
             "settle": self.settle,
             "rules": self.rules,
+            "perturb": self.perturb,
+            "perturb_seed": self.perturb_seed,
             "render_mode": "rgb_array",
         }
 
     def create_envs(self, n_envs: int, use_async_envs: bool = False) -> dict[str, dict[int, VectorEnv]]:
-        """Batches of environments by split, each under the number 0.
+        """Batches of environments by split and perturbation, each under the number 0.
 
         Raises:
             ScengenError: a setting or a pool is not valid.
@@ -125,7 +139,8 @@ class ScengenEnv(EnvConfig):
                 envs: VectorEnv = AsyncVectorEnv(makers, context="forkserver", autoreset_mode=AutoresetMode.SAME_STEP)
             else:
                 envs = SyncVectorEnv(makers, autoreset_mode=AutoresetMode.SAME_STEP)
-            found[split] = {0: envs}
+            perturbation = Perturbation.parse(self.perturb)
+            found[f"{split}_{perturbation}" if perturbation else split] = {0: envs}
         return found
 
     def _environment(self, split: str, slot: int) -> gymnasium.Env:

@@ -55,7 +55,7 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
     if not found.results:
         raise BadConfig(f"nothing was graded: {found.stopped or found.refused[-1]}")
     for stage in sorted({result["stage"] for result in found.results}):
-        rows, title = lines(found.results, stage), f"{settings.model}: {TITLES[stage]}, right [%]"
+        rows, title = lines(found.results, stage), f"{settings.title}: {TITLES[stage]}, right [%]"
         _print(title, rows)
         sight, unseen = sight_lines(found.results, found.priors) if stage == UNDERSTAND else ([], [])
         if sight:
@@ -84,9 +84,10 @@ def _shown(settings: AgentSettings, found: Outcome) -> int:
         say(f"{note} ({count} calls)")
     versions = {result["task"]: result["task_version"] for result in found.results}
     read_as = {"strict": settings.strict, "notes": dict(found.notes), "refused": len(found.refused)}
-    about = {"model": settings.model, "task_versions": versions, **read_as, "stages": printed}
+    played = {"model": settings.model, "perturbation": str(settings.perturbation)}
+    about = {**played, "task_versions": versions, **read_as, "stages": printed}
     write_json(str(folder / f"table-{settings.stage}.json"), about)
-    page = write_page(folder, found.results, settings.model, found.priors)
+    page = write_page(folder, found.results, settings.title, found.priors)
     cost = "" if found.cost is None else f", cost {found.cost:.4g}"
     say(f"{found.calls} new calls, {found.tokens} tokens{cost}; wrote {page} and its tables")
     if found.refused:
@@ -102,7 +103,7 @@ def _show_executed(settings: AgentSettings, found: Outcome) -> None:
     rows, agreed = executed_lines(found.results), agreement(found.results)
     assert agreed
     if rows:
-        title = f"{settings.model}: {TITLES[PLAN]} carried out, goal reached [%]"
+        title = f"{settings.title}: {TITLES[PLAN]} carried out, goal reached [%]"
         _print(title, rows)
         write(settings.folder / "table-2-executed.md", markdown(title, rows))
         for what, reached, all_ in (

@@ -1,9 +1,10 @@
 """print the contents of a pool or of one scenario, and draw them"""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ...errors import BadConfig
+from ...look.looks import look_named
 from ...ood.analysis.redraw import task_of
 from ...pictures import film, render
 from ...pictures.sheet import contact_sheet
@@ -30,11 +31,12 @@ class ShowSettings:
     to: str | None
     images: int
     films: bool
+    look: str
 
 
 def command(arguments: Arguments) -> int:
     settings = read("show", arguments, ShowSettings)
-    target = Path(settings.to) if settings.to else None
+    target, look = Path(settings.to) if settings.to else None, look_named(settings.look)
     if settings.id is None:
         at_least(settings, images=0)
         if target and target.suffix != ".html":
@@ -53,7 +55,7 @@ def command(arguments: Arguments) -> int:
         if target:
             with ProgressBar(err, "contact sheet", 1) as bar:
                 made = [(pool, task_of(pool, search_path(arguments))) for pool in pools]
-                if missing := contact_sheet(made, target, settings.images, settings.films, bar.of):
+                if missing := contact_sheet(made, target, settings.images, settings.films, bar.of, look):
                     remark(f"{target} has no pictures: {missing}")
     else:
         if target and target.suffix != ".png":
@@ -66,7 +68,8 @@ def command(arguments: Arguments) -> int:
         if target:
             render.check_pictures()
             scenario = task_of(pool, search_path(arguments)).scenario(row.params)
-            write(target, render.encode(film.strip(film.Take.witness(check_row(row), scenario)), "png"))
+            take = replace(film.Take.witness(check_row(row), scenario), look=look)
+            write(target, render.encode(film.strip(take), "png"))
     if target:
         say(f"wrote {target}")
     return OK

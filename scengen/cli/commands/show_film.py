@@ -13,6 +13,8 @@ from ...episode import check_rules
 from ...errors import BadConfig
 from ...look.looks import look_named
 from ...ood.analysis.redraw import task_of
+from ...perturb.language import Words
+from ...perturb.perturbation import Perturbation
 from ...pictures.film import WITNESS, Take, movie, periods_between, shortcut, strip
 from ...pictures.render import check_pictures, encode
 from ...pictures.shared_view import directions_of
@@ -47,6 +49,8 @@ class FilmSettings:
     raw: bool
     camera: str | None
     look: str
+    perturb: str | None
+    perturb_seed: int
     frames: int
     fps: int
     width: int
@@ -66,7 +70,8 @@ class FilmSettings:
         if self.raw and self.of == WITNESS:
             raise BadConfig("raw = true plays a shortcut without the filter; give one as of=NAME, or leave raw out")
         look_named(self.look)
-        at_least(self, frames=1, fps=1, width=1, height=1)
+        Perturbation.parse(self.perturb).check_perceived("make a pool under it with generate perturb=, and film that")
+        at_least(self, frames=1, fps=1, width=1, height=1, perturb_seed=0)
         check_format(Path(self.to), self.frames, self.fps, self.width, self.height)
 
 
@@ -86,7 +91,12 @@ def command(arguments: Arguments) -> int:
     settings.check()
     try_file(settings.to)
     check_pictures()
-    take = replace(_take(settings, arguments), look=look_named(settings.look))
+    perturbation = Perturbation.parse(settings.perturb)
+    take, words = _take(settings, arguments)
+    take = replace(take, look=look_named(settings.look), perturbation=perturbation, perturb_seed=settings.perturb_seed)
+    if perturbation.has_words:
+        said = perturbation.of(take.scenario.id, settings.perturb_seed, words=words)
+        say(f"the instruction is: {said.instruction}")
     target, size = Path(settings.to), (settings.width, settings.height)
     with ProgressBar(err, "film", 1) as bar:
         if target.suffix == ".png":
@@ -99,7 +109,8 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
-def _take(settings: FilmSettings, arguments: Arguments) -> Take:
+def _take(settings: FilmSettings, arguments: Arguments) -> tuple[Take, Words]:
+    """What is filmed, and its instruction with other wordings."""
     if settings.hit:
         return _take_of_hit(settings, arguments)
     folders = several(settings.pool or "")
@@ -110,7 +121,7 @@ def _take(settings: FilmSettings, arguments: Arguments) -> Take:
     return _take_of_pool(settings, arguments)
 
 
-def _take_of_run(settings: FilmSettings, folders: Sequence[str], arguments: Arguments) -> Take:
+def _take_of_run(settings: FilmSettings, folders: Sequence[str], arguments: Arguments) -> tuple[Take, Words]:
     """A take of a demonstration or of a rollout of a policy, failed ones included if they were kept.
 
     Raises:
@@ -136,24 +147,26 @@ def _take_of_run(settings: FilmSettings, folders: Sequence[str], arguments: Argu
     say(f"{check_row(row).name}, run {number} ({row.style}): {outcome}")
     task = task_of_manifest(source, compose.load_task(source.task, search_path(arguments)))
     rules = check_rules(source.manifest.config.rules)
-    return Take(task.scenario(row.params), row.scene_xml, row.embodiment, row.witness, rules=rules)
+    words = Words.of(row.task, row.instruction, search_path(arguments))
+    return Take(task.scenario(row.params), row.scene_xml, row.embodiment, row.witness, rules=rules), words
 
 
-def _take_of_pool(settings: FilmSettings, arguments: Arguments) -> Take:
+def _take_of_pool(settings: FilmSettings, arguments: Arguments) -> tuple[Take, Words]:
     """A take of the witness of a scenario in a pool, or of one of its shortcuts."""
     pool = holder(settings.pool, str(settings.id))
     row = check_row(chosen(pool, str(settings.id)))
     task = task_of(pool, search_path(arguments))
     directions, scenario = directions_of(pool, task), task.scenario(row.params)
+    words = Words.of(row.task, row.instruction, search_path(arguments))
     if settings.of == WITNESS:
-        return replace(Take.witness(row, scenario), directions=directions)
+        return replace(Take.witness(row, scenario), directions=directions), words
     take, rollout = shortcut(row, scenario, settings.of, settings.raw)
     outcome = f"{rollout.outcome} after {rollout.seconds:g} s{': ' if rollout.reason else ''}{rollout.reason}"
     say(f"{settings.of}: {outcome}")
-    return replace(take, directions=directions)
+    return replace(take, directions=directions), words
 
 
-def _take_of_hit(settings: FilmSettings, arguments: Arguments) -> Take:
+def _take_of_hit(settings: FilmSettings, arguments: Arguments) -> tuple[Take, Words]:
     """A take of a hit of the adversary."""
     hit = Hit.load(Path(str(settings.hit)))
     search = search_path(arguments)
@@ -166,4 +179,5 @@ def _take_of_hit(settings: FilmSettings, arguments: Arguments) -> Take:
     say(str(hit))
     if other := task.other_version("found on", hit.task_version):
         remark(f"hit = {settings.hit}: {other}")
-    return Take(scenario, rebuild(scenario), task.embodiment, hit.actions)
+    words = Words.of(task.name, task.instruction, search)
+    return Take(scenario, rebuild(scenario), task.embodiment, hit.actions), words

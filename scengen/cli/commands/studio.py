@@ -80,7 +80,7 @@ def _pools(app: ModuleType, settings: StudioSettings, search: tuple[str, ...]) -
     if empty := [pool for pool in pools if not len(pool)]:
         raise BadConfig(f"{empty[0].folder} holds no scenario; name another pool")
     tasks = {str(pool.folder): task_of(pool, search) for pool in pools}
-    return app.Content(app.Shelf(pools, tasks))
+    return app.Content(app.Shelf(pools, tasks, search))
 
 
 def _takes(app: ModuleType, settings: StudioSettings, search: tuple[str, ...]) -> Any:

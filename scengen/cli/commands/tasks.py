@@ -9,7 +9,7 @@ from ...evidence.table import evidence_table
 from ...samplers import task_files
 from ...samplers.task_files import about, search_path
 from ..tables import axes_table, task_tables, tasks_table
-from . import OK, Arguments, out
+from . import OK, Arguments, out, say
 from .settings import read
 
 PAPER = "paper"
@@ -31,6 +31,8 @@ def command(arguments: Arguments) -> int:
     search = search_path(arguments)
     with ledger.opened(settings.records, search):
         _print(settings.axes, name, arguments)
+    if settings.records is not None and not settings.axes:
+        say(f"claimed, and not checked: the figures of {settings.records}; scengen measure fresh=true makes them again")
     return OK
 
 

@@ -10,6 +10,7 @@ from ...errors import BadConfig, cut
 from ...export.dataset import CURATION, Recording
 from ...export.recording import RecordSettings, record
 from ...learn.data import KEPT, TrainingData, kept_episodes
+from ...learn.models import KNN
 from ...learn.train import Trained, TrainSettings, train
 from ...pool.demonstrations import Demonstrations, is_demonstrations
 from ...pool.manifest import MANIFEST
@@ -38,7 +39,8 @@ def command(arguments: Arguments) -> int:
     with ProgressBar(err, f"train {settings.policy}", settings.epochs) as progress_bar:
         trained = train(settings, data, lambda done, total, status: progress_bar.of(done, total, status))
     if not trained.losses:
-        say(f"{settings.to} holds this policy already: same data, same settings")
+        claimed = "" if settings.policy == KNN else "; its weights are claimed, delete it to train again"
+        say(f"{settings.to} holds this policy already: same data, same settings{claimed}")
     else:
         out.print(_table(trained))
         if trained.earlier:
