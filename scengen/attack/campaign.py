@@ -2,13 +2,13 @@
 
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ..episode import STRICT, Actions, Rules, check_rules
-from ..errors import BadConfig, Infeasible, ScengenError, UnknownName
+from ..errors import BadConfig, Infeasible, ScengenError, UnknownName, cut
 from ..pool import Pool, PoolRow
 from ..pool.files import sha256
 from ..pool.names import Name
@@ -20,13 +20,15 @@ from ..validate.identity import source_sha256
 from ..validate.playable import scene_errors
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
+from ..validate.verify.claims import alike
+from ..work.fingerprint import fingerprint
 from ..work.limits import at_least
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
 from ..work.plain import read_plain, why_not_plain
 from ..work.targets import write
 from .adversary import LEAKS, PRIOR, RANDOM, RATED, TIERS, Attack, AttackResult, UntriedShortcut, never
-from .evidence import Hit, TierRate, rates, unsound
+from .evidence import Hit, TierRate, rates, replayed
 from .experience import Experience, experience, feasible
 from .player import Player
 from .priors import AnswerJudge, Prior, by_statics, fit, has_statics
@@ -307,6 +309,8 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
     Yields:
         The tier or file in question, and the contradiction.
     """
+    attack = pool.manifest.attack or {}
+    yield from (("attack", why) for why in _contradictions(pool, attack))
     counts = Counter((hit["tier"], hit["raw"]) for hit in pool.manifest.hits)
     for rate in pool.manifest.rates:
         if rate["tier"] not in RATED:
@@ -326,12 +330,69 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
             listed = {key: value for key, value in entry.items() if key not in ("file", "sha256")}
             if sha256(read_plain(path, MAX_HIT)) != entry["sha256"] or json.loads(json.dumps(found.plain())) != listed:
                 yield entry["file"], "the hit differs from the one that the manifest lists"
+            elif entry["file"] != f"{HITS_FOLDER}/{found.name}.npz":
+                yield entry["file"], f"the hit has another name than {found.name}, or is listed twice"
             elif found.refutes and found.scenario in ids:
                 yield entry["file"], f"the pool holds {found.scenario}, which this hit refutes"
-            elif why := unsound(found, task):
+            elif why := (again := replayed(found, task)).fault:
                 yield entry["file"], why
+            elif not again.exact and pool.manifest.fingerprint == fingerprint():
+                yield entry["file"], "the replay ends in other bits than the hit says"
         except (ScengenError, OSError, ValueError) as error:
             yield entry["file"], str(error)
+
+
+ENTRIES = (
+    *("task", "task_version", "rules", "grammar", "scenarios", "rollouts"),
+    *("rates", "priors", "not_tried", "lost", "hits"),
+)
+"""Entries about an attack in the manifest of a pool."""
+
+
+def _contradictions(pool: Pool, attack: Mapping[str, Any]) -> Iterator[str]:
+    """Entries about an attack that contradict each other, or the pool. Earlier releases have fewer of them."""
+    if unknown := sorted(attack.keys() - {*ENTRIES}):
+        yield f"it has an unknown entry {cut(unknown[0])!r}"
+    manifest, rates = pool.manifest, pool.manifest.rates
+    of = {"task": pool.task, "task_version": manifest.task_version, "rules": STRICT}
+    of["rollouts"] = sum(rate["rollouts"] for rate in rates)
+    for name, here in of.items():
+        if (there := attack.get(name, here)) != here:
+            yield f"it says {name} = {cut(repr(there), 40)}, which must be {here!r}"
+    refuting = Counter((hit["tier"], hit["raw"]) for hit in manifest.hits if hit.get("lacks") or hit.get("otherwise"))
+    for rate in rates:
+        key = rate["tier"], rate["raw"]
+        made = TierRate(*key, rate["rollouts"], rate["hits"], refuting[key]).plain()
+        if wrong := [name for name, there in rate.items() if not alike({name: made.get(name)}, {name: there})]:
+            yield f"{wrong[0]} of the tier {key[0]} does not follow from the listed hits and rollouts"
+        if rate["hits"] > rate["rollouts"]:
+            yield f"the tier {key[0]} has more hits than rollouts"
+    if len({(rate["tier"], rate["raw"]) for rate in rates}) < len(rates):
+        yield "it counts a tier twice"
+    yield from _other_scenarios(pool, attack)
+
+
+def _other_scenarios(pool: Pool, attack: Mapping[str, Any]) -> Iterator[str]:
+    """Whether the attacked scenarios are those of the pool and those that were refuted."""
+    lists: dict[str, Any] = {name: attack.get(name, []) for name in ("scenarios", "lost", "priors", "not_tried")}
+    if wrong := [name for name, there in lists.items() if not isinstance(there, list)]:
+        yield f"{wrong[0]} is not a list"
+        return
+    named, ids = {str(name) for name in lists["scenarios"]}, {id_ for (id_,) in pool.columns("id")}
+    refuted = {str(hit.get("scenario")) for hit in pool.manifest.hits if hit.get("lacks") or hit.get("otherwise")}
+    if named and named != ids | refuted:
+        yield f"it names the scenarios {shown(named)}, not those of the pool and of the hits that refute"
+    for told, names in (
+        ("hits of", [str(hit.get("scenario")) for hit in pool.manifest.hits]),
+        ("losses of", [str(lost).partition(" ")[0] for lost in lists["lost"]]),
+    ):
+        if others := {*names} - (named or ids | refuted):
+            yield f"it has {told} {shown(others)}, which it has not attacked"
+
+
+def shown(names: Iterable[str]) -> str:
+    """The first of some names, for messages."""
+    return cut(", ".join(sorted(names)[:3]), 100)
 
 
 def player_of(subject: Subject, rules: Rules = STRICT) -> Player:

@@ -2,7 +2,7 @@
 
 import json
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from io import BytesIO
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 
 from ..episode import RULES, STRICT, Actions, Rules
 from ..errors import BadConfig, NoOracle, cut
+from ..geometry import Vec3
 from ..params import Value, values
 from ..pool.columns import ID, witness
 from ..pool.untrusted import (
@@ -37,7 +38,7 @@ from ..work.machine import memory_bounded
 from ..work.plain import open_plain
 from ..work.targets import write
 from .player import SETTLE_TIME, Attempt, Node, Played, Player
-from .signature import ContactPair, pairs
+from .signature import ContactPair, pairs, robots, scene_bodies, signature, starts
 from .variations import at_another_pace
 
 VARIED_RUNS = 40
@@ -94,9 +95,9 @@ class Hit:
         return f"{self.scenario}-{self.tier}-{spelled(self.raw)}-{self.digest[:6]}"
 
     def __str__(self) -> str:
-        contacts = " without " + ", ".join(f"{one} - {other}" for one, other in self.lacks) if self.lacks else ""
+        contacts = ", without " + ", ".join(f"{one} - {other}" for one, other in self.lacks) if self.lacks else ""
         otherwise = f" [lacks: {self.otherwise}]" if self.otherwise else ""
-        return f"by {self.tier}, {spelled(self.raw)},{contacts}{otherwise}: {self.plan}"
+        return f"by {self.tier}, {spelled(self.raw)}{contacts}{otherwise}: {self.plan}"
 
     def plain(self) -> dict[str, Any]:
         """All fields but actions and parameters, as plain data."""
@@ -179,26 +180,61 @@ OTHER_SCENARIO = "the scenario's id does not belong to its parameters; one of a 
 """Reason why a hit cannot be examined."""
 
 
-def unsound(hit: Hit, task: Task) -> str:
-    """Reason why a stored hit does not hold; empty if it does.
+@dataclass(frozen=True)
+class Replayed:
+    """Result of the replay of a stored hit."""
 
-    The scene is built from its parameters, and its actions are replayed. The reason names the version of the task on
-    which the hit was found if it is not the installed one.
+    fault: str = ""
+    """Reason why it does not hold; empty if it does."""
+    exact: bool = True
+    """Whether the replay ends in the bits that the hit says."""
+
+
+def replayed(hit: Hit, task: Task) -> Replayed:
+    """Replay a stored hit in the scene that is built from its parameters, and compare what it says.
+
+    The fault names the version of the task on which the hit was found if it is not the installed one. Of another
+    version only the goal is compared.
 
     Raises:
         ScengenError: the parameters are not those of the task.
     """
     scenario = task.scenario(hit.params)
     if scenario.id != hit.scenario:
-        return OTHER_SCENARIO
+        return Replayed(OTHER_SCENARIO)
     world = world_of(scenario, task.embodiment)
+    start = starts(world)
     again = replay(scenario, world, hit.actions, task.horizon, SETTLE_TIME, rules=hit.rules)
-    if again.solved and (again.lacks == hit.otherwise or hit.task_version != task.version):
-        return ""
-    if again.solved:
-        return f"it says that it lacks {hit.otherwise or 'no mean'}, and lacks {again.lacks or 'none'}"
-    other = task.other_version("found on", hit.task_version)
-    return f"its actions do not reach the goal: {again.reason}{other and f' ({other})'}"
+    exact = again.digest == hit.digest
+    if not again.solved:
+        other = task.other_version("found on", hit.task_version)
+        return Replayed(f"its actions do not reach the goal: {again.reason}{other and f' ({other})'}", exact)
+    if hit.task_version != task.version:
+        return Replayed(exact=exact)
+    if again.lacks != hit.otherwise:
+        told = f"it says that it lacks {hit.otherwise or 'no mean'}, and lacks {again.lacks or 'none'}"
+        return Replayed(told, exact)
+    return Replayed(next(_false_words(hit, again.seconds if exact else None, world, start), ""), exact)
+
+
+def _false_words(hit: Hit, seconds: float | None, world: World, start: Mapping[str, Vec3]) -> Iterator[str]:
+    """What a hit says otherwise than its replay.
+
+    Args:
+        seconds: time at which the replay has reached the goal [s]; None if it cannot be compared.
+        world: the world at the end of the replay.
+        start: positions of the free bodies at the start.
+    """
+    if seconds not in (None, hit.seconds):
+        yield f"it says that it reaches the goal after {hit.seconds:g} s; replayed, it takes {seconds:g} s"
+    made, names = signature(world, start), {*scene_bodies(world).values(), *robots(world).values()}
+    for pair in hit.lacks:
+        if pair in made.pairs or not names.issuperset(pair):
+            why = "it makes" if pair in made.pairs else "the scene cannot have"
+            yield f"it says that it lacks the contact {' - '.join(pair)}, which {why}"
+    for body in hit.unmoved:
+        if body in made.moved or body not in start:
+            yield f"it says that {body} stays where it is, which {'moves' if body in made.moved else 'is no free body'}"
 
 
 class CausalContacts:

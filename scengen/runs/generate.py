@@ -141,8 +141,10 @@ def generate(task: Task, certify_settings: CertifySettings, settings: GenerateSe
         locked = lock.lock_of_run(journal.folder, task.family, made_with(task))
         records = journal.records()
         _extend(job, settings, records, journal, progress)
-        asked = settings.attack and first_of(records, "certified", settings.n)
-        report = _attack(job, settings, records, journal, progress) if asked else None
+        attacked = first_of(records, "certified", settings.n) if settings.attack else []
+        if len(attacked) == settings.n:  # what a longer run has certified is not attacked, and takes no other's place
+            records = {index: record for index, record in records.items() if index <= attacked[-1]}
+        report = _attack(job, settings, records, journal, progress) if attacked else None
         with reported_write_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
             replace_file(folder / lock.LOCK_FILE, locked.encode())

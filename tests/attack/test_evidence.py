@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -9,15 +10,17 @@ from unittest import mock
 
 import numpy as np
 import pytest
+from pools import make
 
 from scengen import cli, load_task
 from scengen.attack.campaign import drawn
 from scengen.attack.check import attacked
-from scengen.attack.evidence import Hit, unsound
+from scengen.attack.evidence import Hit, replayed
 from scengen.errors import BadConfig
 from scengen.pool import Pool
 from scengen.pool.files import sha256
 from scengen.predicates import touched_only
+from scengen.runs.attempts import first_of
 from scengen.validate.certify import certify
 from scengen.validate.settings import QUICK, Robust
 
@@ -87,6 +90,79 @@ def test_a_false_hit_in_a_pool_is_noticed(attacked_pool, tmp_path, forged):
     assert cli.run(["verify", f"pool={pool}", "level=replay"]) == 1
 
 
+HITS = {
+    "too fast": ({"seconds": 0.5}, "reaches the goal after 0.5 s; replayed, it takes"),
+    "lacks a contact": ({"lacks": (("robot", "tile_0"),)}, "lacks the contact robot - tile_0, which it makes"),
+    "lacks what is not there": ({"lacks": (("moon", "sun"),)}, "which the scene cannot have"),
+    "moves the slab": ({"unmoved": ("slab",)}, "slab stays where it is, which moves"),
+    "a body of another scene": ({"unmoved": ("moon",)}, "which is no free body"),
+}
+
+
+@pytest.mark.parametrize("name", HITS)
+def test_what_a_hit_says_is_compared_with_its_replay(attacked_pool, tmp_path, capsys, name):
+    changed, says = HITS[name]
+    hit = replace(Hit.load(next((attacked_pool / "hits").iterdir())), **changed)
+    hit.store(tmp_path)
+    assert cli.run(["verify", f"hits={tmp_path}"]) == 1
+    told = capsys.readouterr().out
+    assert says in told and "claimed, and not checked: how hits were found" in told
+
+
+def test_a_hit_that_ends_in_other_bits_is_told_of(attacked_pool, tmp_path, capsys):
+    replace(Hit.load(next((attacked_pool / "hits").iterdir())), digest="0" * 16, seconds=0.5).store(tmp_path)
+    assert cli.run(["verify", f"hits={tmp_path}"]) == 0
+    assert "ends in other bits than it says: it was found on another machine, or edited" in capsys.readouterr().out
+
+
+def _rates(**entries):
+    return lambda attack: [rate.update(entries) for rate in attack["rates"]]
+
+
+ENTRIES = {
+    "too few rollouts": (_rates(rollouts=0), "more hits than rollouts"),
+    "many rollouts": (_rates(rollouts=10**9), "bound of the tier"),
+    "no rate": (_rates(rate=0.0), "rate of the tier"),
+    "refuting": (_rates(refuting=1), "refuting of the tier"),
+    "sum": (lambda a: a.update(rollouts=10**9), "it says rollouts = 1000000000"),
+    "twice": (lambda a: a["rates"].append(a["rates"][-1]), "it counts a tier twice"),
+    "rules": (lambda a: a.update(rules="paper"), "it says rules = 'paper'"),
+    "task": (lambda a: a.update(task="packing"), "it says task = 'packing'"),
+    "version": (lambda a: a.update(task_version=7), "it says task_version = 7"),
+    "scenarios": (lambda a: a.update(scenarios=["0" * 12]), "it names the scenarios 000000000000"),
+    "losses": (lambda a: a.update(lost=["0" * 12 + " died"]), "it has losses of 000000000000"),
+    "types": (lambda a: a.update(priors=5), "priors is not a list"),
+    "more": (lambda a: a.update(reviewed=True), "it has an unknown entry 'reviewed'"),
+    "no more hits": (lambda a: a.update(hits=[]), "counts a different number of hits"),
+    "one hit twice": (lambda a: a["hits"].append({**a["hits"][0], "file": "hits/copy.npz"}), "is listed twice"),
+}
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_entries_about_an_attack_that_contradict_each_other_are_refuted(attacked_pool, tmp_path, name, capsys):
+    pool = Path(shutil.copytree(attacked_pool, tmp_path / "pool"))
+    manifest = json.loads((pool / "manifest.json").read_text())
+    shutil.copy(pool / manifest["attack"]["hits"][0]["file"], pool / "hits" / "copy.npz")
+    change, says = ENTRIES[name]
+    change(manifest["attack"])
+    (pool / "manifest.json").write_text(json.dumps(manifest, indent=1, sort_keys=True) + "\n")
+    assert cli.run(["verify", f"pool={pool}", "level=replay", f"json={tmp_path / 'told.json'}"]) == 1
+    failed = json.loads((tmp_path / "told.json").read_text())["failed"]
+    assert any(re.search(says, one["reason"]) for one in failed), failed
+
+
+@pytest.mark.slow
+def test_no_scenario_that_was_not_attacked_takes_the_place_of_a_refuted_one(tmp_path, monkeypatch):
+    def refuting(job, settings, records, journal, progress):
+        first = first_of(records, "certified", settings.n)[0]
+        records[first] = replace(records[first], verdict="refuted", check="attack", reason="a way around")
+
+    second = make(tmp_path / "pool", n=3).pool.at(1).index
+    monkeypatch.setattr("scengen.runs.generate._attack", refuting)
+    again = make(tmp_path / "pool", n=2, attack=4)
+    assert [row.index for row in again.pool.rows()] == [second]
+
+
 @pytest.mark.parametrize("content", [b"", b"no zip", b"PK\x03\x04" + bytes(60)])
 def test_a_file_that_is_no_hit_is_one_clear_error(tmp_path, content, capsys):
     (tmp_path / "hit.npz").write_bytes(content)
@@ -127,12 +203,13 @@ def test_what_a_hit_says_is_checked_before_it_is_used(attacked_pool, tmp_path, c
 def test_a_hit_of_another_version_is_told_of(attacked_pool, tmp_path, capsys, monkeypatch):
     whole = next((attacked_pool / "hits").iterdir())
     hit = Hit.load(whole)
-    assert hit.task_version == 1 and Pool.open(attacked_pool).manifest.attack["task_version"] == 1
-    assert unsound(hit, TASK) == ""
-    monkeypatch.setattr(TASK.family, "VERSION", 2)
-    assert unsound(hit, TASK) == "", "a hit that still replays holds"
-    told = unsound(replace(hit, actions=hit.actions[:-300] * 0), TASK)
-    assert told.endswith("(found on version 1 of domino_single; installed: 2)")
+    now = TASK.version
+    assert hit.task_version == now and Pool.open(attacked_pool).manifest.attack["task_version"] == now
+    assert replayed(hit, TASK).fault == ""
+    monkeypatch.setattr(TASK.family, "VERSION", now + 1)
+    assert replayed(hit, TASK).fault == "", "a hit that still replays holds"
+    told = replayed(replace(hit, actions=hit.actions[:-300] * 0), TASK).fault
+    assert told.endswith(f"(found on version {now} of domino_single; installed: {now + 1})")
     with np.load(whole) as stored:  # as earlier releases wrote it
         about = json.loads(str(stored["about"]))
         del about["task_version"]

@@ -12,7 +12,7 @@ from rich.table import Table
 from ... import compose
 from ...attack.campaign import wrong_hits
 from ...attack.check import attacked
-from ...attack.evidence import Hit, unsound
+from ...attack.evidence import Hit, replayed
 from ...demos.verify import verify_demonstrations
 from ...errors import BadConfig, UnknownName, cut
 from ...evaluate.audit import audit
@@ -255,11 +255,14 @@ def _replay_hits(hits: str, pool: str | list[str] | None, search: Sequence[str])
     for path in paths:
         hit = Hit.load(path)
         task = attacked_task or compose.load_task(hit.task, search)
-        reason = unsound(hit, task)
-        wrong += bool(reason)
-        say(f"{path.name}: {reason or f'reaches the goal of {hit.scenario} after {hit.seconds:g} s, {hit}'}")
+        again = replayed(hit, task)
+        wrong += bool(again.fault)
+        say(f"{path.name}: {again.fault or f'reaches the goal of {hit.scenario} after {hit.seconds:g} s, {hit}'}")
+        if not again.exact and not again.fault:
+            say(f"{path.name}: ends in other bits than it says: it was found on another machine, or edited")
         if other := task.other_version("found on", hit.task_version):
             say(f"{path.name}: {other}")
+    say("claimed, and not checked: how hits were found (tier, plan, filter), that every solution makes what they lack")
     say(f"{len(paths) - wrong} of {len(paths)} hits replay")
     return FAILED if wrong else OK
 

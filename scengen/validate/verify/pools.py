@@ -269,10 +269,10 @@ class _Run:
         if lost := sum(times for key, times in manifest.reasons.items() if key.partition(": ")[0] == PROCESS):
             told = f"{lost} indices were lost to limits or crashes on the author's machine"
             remarks.append(f"{told}: that their scenarios cannot be certified is the author's word")
-        if manifest.rates:
+        if manifest.attack is not None:
             rollouts = sum(rate["rollouts"] for rate in manifest.rates)
             told = f"the attack on the pool counts {rollouts} rollouts and {len(manifest.hits)} hits"
-            remarks.append(f"{told}: the hits are replayed, and the number of rollouts is the author's word")
+            remarks.append(f"{told}: the hits are replayed; rollouts, losses and fixed answers are the author's word")
         if not self.manifest.is_subset and len(self.pool) < self.manifest.n:
             told = f"{self.manifest.n} scenarios were requested, and the run ended with {len(self.pool)}"
             self.found.remarks.append(f"{told}: this number is the author's word")
