@@ -28,17 +28,17 @@ LOOKS_AT_LEVEL = 3
 """Number of first looks at each level: three failures between successes are seen as a fall and a rise."""
 LOOKS_PER_ROUND = 2
 """Number of further looks that are chosen together."""
-MARGIN = 4.0
+MARGIN = 4.2
 """Twice the largest logarithm of a likelihood ratio within an interval, after `FULL_SEARCH` looks."""
 FULL_SEARCH = 60
-"""Number of looks from which on the margin stays the same. Before, it grows with the root of their share."""
+"""Number of looks from which on the margin stays the same. With half as many it is twice as large."""
 SUSPECTED_RISE = 1.5
 """Twice the logarithm of the likelihood ratio of a rise that is looked at again: that of 2 of 3 after 3 of 3 solved."""
 RISE = 9.0
 """The same for a rise that is reported. Of two chances that are equal, it is as large in 1 of 700 cases."""
 STEP = 0.05
 """Distance between candidates [levels]."""
-SCALES = (0.02, 0.15, 0.35, 0.6, 0.9, 1.3, 1.9)
+SCALES = (0.003, 0.2, 0.5, 0.9, 1.4, 2.2)
 """Scales of the logistic curves [levels]: from a step to a fall over the whole axis."""
 PLATEAUS = (0.2, 0.4, 0.6, 0.76, 0.9, 0.998)
 """Distances of the plateaus from the value, as shares of its distances from 0 and 1."""
@@ -104,16 +104,20 @@ class Curves:
         likelihood = self._likelihood(tried * counts, solved * counts)
         ratio = 2 * np.log(np.maximum(likelihood, 1e-300) / likelihood.max(axis=1, keepdims=True))
         share = np.minimum(1.0, tried.sum(axis=1, keepdims=True) / FULL_SEARCH)
-        held = ratio >= -MARGIN / np.sqrt(share)
+        held = ratio >= -MARGIN / share
         first, last = held.argmax(axis=1), held.shape[1] - 1 - held[:, ::-1].argmax(axis=1)
         within = np.cumsum(likelihood * held, axis=1)
         middle = (within >= within[:, -1:] / 2).argmax(axis=1)
         low, high = self._ends
         return Estimates(low[first], (low + high)[middle] / 2, high[last], fallen, risen, rise)
 
-    def next_level(self, tried: Ints, solved: Ints) -> Ints:
+    def next_level(self, tried: Ints, solved: Ints, possible: Bools | None = None) -> Ints:
         """The level of the next looks of each search: of a pair with a suspected rise the one with fewer looks,
-        otherwise the one that is expected to reveal most about the breaking point (mutual information)."""
+        otherwise the one that is expected to reveal most about the breaking point (mutual information).
+
+        Args:
+            possible: whether further looks at each level are possible; all are by default.
+        """
         fallen, risen, rise = _clearest_rise(tried, solved)
         counts = self._counting(risen, rise)
         weights = self._weights(tried * counts, solved * counts)
@@ -123,10 +127,12 @@ class Curves:
             chances = np.add.reduceat(weights * self._chances[:, level], self._starts, axis=1)
             given = np.divide(chances, of_candidate, out=np.zeros_like(chances), where=of_candidate > 0)
             told[:, level] = _entropy(chances.sum(axis=1)) - (of_candidate * _entropy(given)).sum(axis=1)
-        best = np.where(counts, told, -1.0).argmax(axis=1)
+        open_levels = np.ones_like(counts) if possible is None else possible
+        best = np.where(counts & open_levels, told, -1.0).argmax(axis=1)
         here = np.arange(len(tried))
         of_pair = np.where(tried[here, fallen] <= tried[here, risen], fallen, risen)
-        return np.where((rise >= SUSPECTED_RISE) & (rise <= RISE), of_pair, best)
+        suspected = (rise >= SUSPECTED_RISE) & (rise <= RISE) & open_levels[here, of_pair]
+        return np.where(suspected, of_pair, best)
 
     def _counting(self, risen: Ints, rise: Floats) -> Bools:
         """Whether each level counts: all levels, or those before a rise."""
