@@ -5,7 +5,7 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
@@ -28,7 +28,7 @@ from .arms import BENIGN, automatic_arms
 from .lines import CHAIN, COLUMNS, FORMAT, RUN, chained, renewed, run_sha256
 from .player import PolicyPlayer, policy_seed
 from .scenarios import Scenarios, chosen, not_playable
-from .settings import Condition, EvaluateSettings, RolloutId, completed
+from .settings import Condition, EvaluateSettings, RolloutId, T, completed
 
 Keep = Callable[[RolloutId, Actions], None]
 """Keeps the actions that the controller received in a rollout; called before the rollout counts as played."""
@@ -50,6 +50,8 @@ class Evaluation:
     """Hashes of the pools of the arm `benign`, by folder."""
     chain: str = ""
     """Hash at the end of the file of episodes, see `lines.chained`."""
+    drawn: Mapping[str, str] = field(default_factory=dict)
+    """Hashes of the pools that a search for a threshold has drawn, by folder."""
 
 
 def evaluate(
@@ -71,16 +73,51 @@ def evaluate(
     Raises:
         ScengenError: a pool, a policy or a setting is not valid.
     """
-    settings = completed(settings)
-    settings.check()
-    kinds.check_target(settings.folder, kinds.EPISODES)
-    try_folder(settings.folder)
+    settings = ready(settings)
     pools = [Pool.open(folder).check() for folder in settings.folders]
     fresh = [Pool.open(folder).check() for folder in settings.benign]
     about = {**chosen(pools, settings, search), **(chosen(fresh, settings, search) if fresh else {})}
     lost = not_playable([*pools, *fresh], about, settings.workers)
     if not (about := {key: told for key, told in about.items() if key[1] not in lost}):
         raise PoolError(f"no scenario can be played; see scengen verify: {'; '.join(lost.values())}")
+    with opened(settings, identity(settings, pools), about, search, keep, progress) as run:
+        run.play(wanted(about, settings))
+        run.play(wanted(about, settings, arms := run.arms()))
+        run.sort()
+        pinned = {str(pool.folder): pool.sha256 for pool in fresh}
+        return Evaluation(run.lines(), run.earlier, lost, arms, pinned, run.chain)
+
+
+def ready(settings: T) -> T:
+    """Checked settings with those that the policy brings, whose folder can be written.
+
+    Raises:
+        ScengenError: a setting is not valid, or the folder is something else.
+    """
+    settings = completed(settings)
+    settings.check()
+    kinds.check_target(settings.folder, kinds.EPISODES)
+    try_folder(settings.folder)
+    return settings
+
+
+@contextmanager
+def opened(
+    settings: EvaluateSettings,
+    depends: Mapping[str, Any],
+    about: Scenarios,
+    search: Sequence[str],
+    keep: Keep,
+    progress: Callable[[int, int], None],
+) -> "Iterator[Run]":
+    """A run that plays rollouts into the folder of the settings, or continues there.
+
+    Args:
+        depends: everything but the policy on which episodes depend, see `identity`.
+
+    Raises:
+        BadConfig: the folder holds episodes of another run.
+    """
     path = settings.folder / kinds.EPISODES
     if settings.remote and settings.version is None and not settings.fresh and path.exists():
         why = f"{path} holds episodes of an earlier run, and a server does not say which weights it serves"
@@ -89,20 +126,15 @@ def evaluate(
     with closing(PolicyPlayer(settings, search)) as player:
         task_versions = {a["task"]: a["task_version"] for a in about.values()}
         described = player.described({*task_versions})
-        depends = {**_identity(settings, pools), "task_versions": task_versions, **described}
         if settings.fresh:
             _move_aside(path)
-        with Log(path, depends, remedy, settings.folder / RUN) as log:
-            run = _Run(settings, player, about, log, keep, progress)
-            run.play(wanted(about, settings))
-            run.play(wanted(about, settings, arms := run.arms()))
-            run.sort()
-            pinned = {str(pool.folder): pool.sha256 for pool in fresh}
-            return Evaluation(run.lines(), run.earlier, lost, arms, pinned, run.chain)
+        whole = {**depends, "task_versions": task_versions, **described}
+        with Log(path, whole, remedy, settings.folder / RUN) as log:
+            yield Run(settings, player, about, log, keep, progress)
 
 
 @dataclass
-class _Run:
+class Run:
     """A run whose log is open."""
 
     settings: EvaluateSettings
@@ -132,6 +164,12 @@ class _Run:
                 self.keep(id_of(record), played)
             self._add(record)
             self.progress(count, len(some))
+
+    def extend(self, settings: EvaluateSettings) -> None:
+        """Go on with settings that name further pools, in which later rollouts are played."""
+        if settings != self.settings:
+            self.player.close()
+            self.settings = self.player.settings = settings
 
     def lines(self) -> list[dict[str, Any]]:
         """The lines of all rollouts of the run."""
@@ -232,7 +270,7 @@ def _crashed(which: RolloutId, reason: str) -> dict[str, Any]:
     return {**asdict(which), **unknown, **nothing, "policy_seed": policy_seed(which.scenario, which.rollout)}
 
 
-def _identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, Any]:
+def identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, Any]:
     """Everything on which the outcome of a rollout depends. More scenarios, rollouts or conditions continue a run."""
     names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "rules", "look")
     chosen = {"format": FORMAT, **{name: getattr(settings, name) for name in (*names, "perturb_seed")}}

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TypeVar
 
 from ..compose import load_task
 from ..control.teleop import check_filter
@@ -196,6 +197,9 @@ class EvaluateSettings:
             raise BadConfig(f"client = {self.client}; policy {self.name} is not behind a socket: leave it out")
 
 
+T = TypeVar("T", bound=EvaluateSettings)
+
+
 @dataclass(frozen=True, order=True)
 class Condition:
     """What is changed in an episode without another scenario."""
@@ -229,7 +233,7 @@ class RolloutId:
         return Condition(self.perturbation, self.arm)
 
 
-def completed(settings: EvaluateSettings) -> EvaluateSettings:
+def completed(settings: T) -> T:
     """Settings with the observations and the rate of a policy that names them, unless they were chosen."""
     if not is_policy(settings.name):
         return settings

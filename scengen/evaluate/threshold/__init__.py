@@ -1,0 +1,1 @@
+"""Where a policy breaks: the level of a shift at which its success falls to one half, from few rollouts."""
