@@ -177,9 +177,7 @@ class Curves:
         centre = point + scale * logit((self.value - floor) / (top - floor))
         curves = floor + (top - floor) * expit((centre - levels) / scale)
         heights = (np.arange(LINES) + 0.5) / LINES
-        lines = [
-            start + (end - start) * levels / self.levels for start in heights for end in heights[heights <= start]
-        ]
+        lines = [start + (end - start) * levels / self.levels for start in heights for end in heights[heights <= start]]
         under, over = self.value * np.array(lines), self.value + (1 - self.value) * np.array(lines)
         return np.clip(np.concatenate([under, curves, over]), MIN_CHANCE, 1 - MIN_CHANCE)
 

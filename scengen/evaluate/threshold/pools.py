@@ -125,7 +125,9 @@ class DrawnPools(LevelPools):
             seed = self.seed + SEEDS_OF_LEVEL * level + number
             asked = GenerateSettings(split=split, n=count, seed=seed, workers=self.workers, pool=str(folder))
             task = self.shift.task
-            made = generate(task, certify_levels(task)[LEVEL], asked, lambda done, *_: self.progress(split, done, count))
+            made = generate(
+                task, certify_levels(task)[LEVEL], asked, lambda done, *_: self.progress(split, done, count)
+            )
             if made.certified < count:
                 why = "; ".join(f"{times}x {reason}" for reason, times in made.reasons.items())[:200]
                 raise PoolError(f"{folder}: only {made.certified} of {count} scenarios could be certified ({why})")

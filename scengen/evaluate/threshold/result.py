@@ -103,7 +103,9 @@ class ThresholdResult(PolicyResult):
         elif self.low is None:
             told = f"breaks before level {self.high:.1f} of {shift.name}, perhaps without a shift (success {share})"
         elif self.high is None:
-            told = f"breaks beyond level {first} of {shift.name}, perhaps not at all up to level {last} (success {share})"
+            told = (
+                f"breaks beyond level {first} of {shift.name}, perhaps not at all up to level {last} (success {share})"
+            )
         else:
             at = "" if self.point is None else f"level {self.point:.1f}"
             value = f", {text}" if self.point is not None and (text := shift.value(self.point)) else ""
