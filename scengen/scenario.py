@@ -1,10 +1,11 @@
 """A scenario: one physical problem with all its numbers, which builds its scene and judges its outcome."""
 
 import abc
+import copy
 import hashlib
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import mujoco
 import numpy as np
@@ -113,6 +114,19 @@ def within_reach(what: str, *points: ArrayLike, base: NDArray[np.float64] = BASE
     return require(away <= REACH, f"{what} is out of reach", distance=away, reach=REACH)
 
 
+@dataclass(frozen=True)
+class Conditions:
+    """Conditions of control under which a scenario is posed, see `scengen.samplers.conditions`."""
+
+    parts: tuple[tuple[str, int], ...]
+    """Kinds with their levels."""
+    embodiment: str
+    """Robot of the task."""
+
+    def __str__(self) -> str:
+        return "+".join(f"{kind}@{level}" for kind, level in self.parts)
+
+
 class Scenario(abc.ABC):
     """Base of every scenario family. A family is a frozen dataclass, and no family derives from another family.
 
@@ -146,8 +160,17 @@ class Scenario(abc.ABC):
     its task does not probe the difference.
     """
 
+    conditions: ClassVar[Conditions | None] = None
+    """Conditions of control under which this scenario is posed; None: the usual ones. `under` sets them."""
+
     def __post_init__(self) -> None:
         check_bounds(self)
+
+    def under(self, conditions: Conditions | None) -> Self:
+        """This scenario under other conditions of control."""
+        posed = copy.copy(self)
+        object.__setattr__(posed, "conditions", conditions)
+        return posed
 
     @abc.abstractmethod
     def build(self) -> mujoco.MjSpec:
@@ -266,6 +289,8 @@ class Scenario(abc.ABC):
 
     @property
     def id(self) -> str:
-        """Id of twelve hex digits. It depends on the family, every parameter and `material`, and on nothing else."""
-        text = f"{type(self).__module__}.{type(self).__qualname__} {canonical(self)}{self.material}"
+        """Id of twelve hex digits. It depends on the family, every parameter, `material` and `conditions`, and on
+        nothing else."""
+        posed = f" {self.conditions}" if self.conditions else ""
+        text = f"{type(self).__module__}.{type(self).__qualname__} {canonical(self)}{self.material}{posed}"
         return hashlib.sha256(text.encode()).hexdigest()[:12]

@@ -34,6 +34,7 @@ from scengen.measures.figures import table
 from scengen.measures.policies import POLICIES
 from scengen.ood.analysis.leaks import SEARCH
 from scengen.ood.baseline import INCONCLUSIVE
+from scengen.samplers.conditions import KINDS
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
 
@@ -177,6 +178,17 @@ def drift() -> dict[str, str]:
     rows = [row for task in list_tasks() for row in ledger.newest("drift", task)]
     sets = sorted({tuple(row.made_with["mujoco"]) for row in rows})
     return {"drift": "\n".join(_drifted(names, [row for row in rows if row.has(mujoco=[*names])]) for names in sets)}
+
+
+def control() -> dict[str, str]:
+    """Conditions of control that each task bears: for each kind the scenarios certified at levels 1 to 5."""
+    lines = []
+    for task in list_tasks():
+        row = next(iter(ledger.newest("control", task)), None)
+        counts = [row.value[kind]["certified"] if row else [] for kind in KINDS]
+        cells = [" ".join(map(str, each)) or ledger.not_measured(task) for each in counts]
+        lines.append([link(task), f"{row.n}{ledger.mark(row)}" if row else NONE, *cells])
+    return {"control": table(("task", "scenarios", *(f"`{kind}`" for kind in KINDS)), lines)}
 
 
 def _drifted(versions: Sequence[str], rows: Sequence[Evidence]) -> str:

@@ -174,6 +174,8 @@ def works(settings: AgentSettings, search: Sequence[str] = ()) -> list[Work]:
 def _check_perturbation(settings: AgentSettings, row: PoolRow, search: Sequence[str]) -> None:
     """Raise `BadConfig` if the model is given nothing that the perturbation affects, or the task has no other text."""
     cameras, perturbation = cameras_of(row.embodiment), settings.perturbation
+    if settings.stage != ACT:
+        perturbation.check_without_control("only stage=3 acts")
     given = streams(row.embodiment, settings.pictures)
     seen = [camera for name, camera in cameras.items() if name in given]
     perturbation.check([name for name in given if name not in cameras], seen)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import Loop
-from ..control.teleop import unfiltered
 from ..episode import STRICT, Actions, Episode, Outcome, Rules
 from ..errors import BadConfig, GaveUp
 from ..geometry import Vec3
@@ -209,7 +208,7 @@ class Player:
         world.restore(self.start.state)
         episode = Episode(self.scenario, world, self.horizon)
         for _ in range(round(seconds / Loop.PERIOD)):
-            episode.step(world.filter(world.idle))
+            episode.step(world.received(world.idle))
             yield
 
     def signature(self) -> Signature:
@@ -266,7 +265,7 @@ class _RunningAttempt:
             self.notes.append(f"{macro.kind} {macro.target}".rstrip() + f": {error}")
 
     def _step(self, action: NDArray[np.float64]) -> Outcome | None:
-        given = unfiltered(action) if self.raw else self.world.filter(action)
+        given = self.world.received(action, self.raw)
         self.rows.append(given)
         return self.episode.step(given)
 

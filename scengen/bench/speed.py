@@ -148,7 +148,7 @@ def _rollout(scenario: Scenario, world: World, horizon: float, periods: int) -> 
         plan, episode = scenario.oracle(world), Episode(scenario, world, horizon)
         for number in range(periods):
             action = next(plan, world.idle) if episode.outcome is None else world.idle
-            episode.step(world.filter(action))
+            episode.step(world.received(action))
             if number % SLICE == SLICE - 1:
                 yield
 

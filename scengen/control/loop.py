@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..robots import panda, suction
 from ..robots.panda import HOME, JOINTS
 from . import native, osc
+from .impairment import Impairment
 
 ACTION = 7
 """Length of the action of one arm: translation (3), rotation vector (3), gripper, each in [-1, 1]. An action of the
@@ -81,13 +82,14 @@ class Loop:
     touching: NDArray[np.uint8]
     """Contact table of the last control period alone, in the form of `touched`."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, home: ArrayLike = HOME):
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, home: ArrayLike = HOME, scripted: int = 0):
         """Take over `data` and reset it.
 
         Args:
             model: of a scene with one or two arms.
             data: of that model.
             home: joint angles of every arm after a reset [rad], shape (7,); or of each, shape (arms, 7).
+            scripted: number of arms, counted from the last, that no impairment of the scene hinders.
 
         Raises:
             ValueError: the model has no arm, or its options do not allow control.
@@ -108,10 +110,14 @@ class Loop:
         given = np.array(home, dtype=np.float64)
         if given.shape not in ((JOINTS,), (len(names), JOINTS)):
             raise ValueError(f"home must be {JOINTS} joint angles of each arm, not an array of shape {given.shape}")
-        self.home = np.broadcast_to(given, (len(names), JOINTS))
+        self.impairment = Impairment.of(model)
+        """What hinders the control of the arms that are not scripted."""
+        self.home = np.broadcast_to(given, (len(names), JOINTS)) + self._offsets(len(names), scripted)
         self._arms = np.zeros(len(names), ARM)
         for arm, name in zip(self._arms, names, strict=True):
             arm["at"] = osc.places(model, data, name)
+        for arm in self._arms[: len(names) - scripted]:
+            osc.tune(arm["at"], self.impairment.stiffness, self.impairment.gripper)
         self._scene = np.zeros(1, SCENE)
         _fill_scene(self._scene[0], model, data, self.substeps)
         self._owner = _owners(model, names)
@@ -125,6 +131,15 @@ class Loop:
         self.holds = panda.width_in_hand(model) is not None
         """Whether the jaw of the first arm is closed on a body at the start (`panda.IN_HAND`)."""
         self.reset()
+
+    def _offsets(self, arms: int, scripted: int) -> NDArray[np.float64]:
+        """Offsets of the joints at the start [rad], shape (arms, 7)."""
+        offsets, driven = np.zeros((arms, JOINTS)), arms - scripted
+        if given := self.impairment.start:
+            if len(given) != JOINTS * driven:
+                raise ValueError(f"the scene offsets {len(given)} joints at the start; its robot has {JOINTS * driven}")
+            offsets[:driven] = np.reshape(given, (driven, JOINTS))
+        return offsets
 
     def __reduce__(self) -> NoReturn:
         remedy = "copy the World, or make Loop(model, data) and restore(loop.state())"

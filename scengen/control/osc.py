@@ -63,12 +63,19 @@ PLACES = np.dtype(
         ("jaw", np.int64, (2,)),
         ("cup", np.int64),
         ("pad", np.int64),
+        ("kp", np.float64),
+        ("kd", np.float64),
+        ("jaw_speed", np.float64),
+        ("suction_speed", np.float64),
     ]
 )
-"""Locations in memory. Addresses: qpos, ctrl, ctrlrange of the whole model; qvel, qfrc_bias, cdof from the first arm
-joint on; M whole; subtree_com of the robot; position and rotation of the grip site and of the controller's base site.
-Indices: joint angles in qpos, arm rows in M, arm motors, jaw motors and suction cup in ctrl, first of the cup's four
-pads among the geoms."""
+"""Locations in memory, and the settings of the controller (`tune`).
+
+Addresses: qpos, ctrl, ctrlrange of the whole model; qvel, qfrc_bias, cdof from the first arm joint on; M whole;
+subtree_com of the robot; position and rotation of the grip site and of the controller's base site. Indices: joint
+angles in qpos, arm rows in M, arm motors, jaw motors and suction cup in ctrl, first of the cup's four pads among the
+geoms. Settings: stiffness, damping, changes of the jaw command and of the suction in one control period.
+"""
 
 STATE = np.dtype(
     [
@@ -79,8 +86,8 @@ STATE = np.dtype(
         ("posture", np.float64, (JOINTS,)),
     ]
 )
-"""State of the controller: goal in the base frame [m], jaw command in [-1, 1] (or, in its first element, suction off
-(0) or on (1)), whether the gripper is forced open (1) against the command, initial angles [rad]."""
+"""State of the controller: goal in the base frame [m], jaw command in [-1, 1] (or, in its first element, the
+suction from off (0) to full (1)), whether the gripper is forced open (1) against the command, initial angles [rad]."""
 
 WORK = np.dtype(
     [
@@ -139,7 +146,14 @@ def places(model: mujoco.MjModel, data: mujoco.MjData, names: Names) -> NDArray[
     found["base_pos"], found["base_rot"] = data.site_xpos[base].ctypes.data, data.site_xmat[base].ctypes.data
     found["angle"] = [joint.qposadr[0] for joint in joints]
     found["row"] = model.M_rowadr[dofs]
+    tune(found, 1.0, 1.0)
     return found
+
+
+def tune(at: NDArray[np.void], stiffness: float, gripper: float) -> None:
+    """Set stiffness, with critical damping, and the gripper's speed, as factors on robosuite's."""
+    at["kp"], at["kd"] = KP * stiffness, KD * math.sqrt(stiffness)
+    at["jaw_speed"], at["suction_speed"] = JAW_SPEED * gripper, gripper
 
 
 def start(state: NDArray[np.void], posture: ArrayLike, closed: bool = False) -> None:
@@ -176,9 +190,9 @@ def set_goal(at: np.record, state: np.record, work: np.record, action: NDArray[n
             work.world_rot[i, j] = _column_dot(base_rot, i, grip_rot, j)
     _multiply(work.delta, work.world_rot, state.goal_rot)
     if at.cup == NONE:
-        _move_jaw(state, action[6])
+        _move_jaw(state, at.jaw_speed, action[6])
     else:
-        state.jaw[0] = 1.0 if action[6] > 0.0 else 0.0
+        state.jaw[0] = min(state.jaw[0] + at.suction_speed, 1.0) if action[6] > 0.0 else 0.0
 
 
 @njit
@@ -248,9 +262,9 @@ def _rotation(x: float, y: float, z: float, out: NDArray[np.float64]) -> None:
 
 
 @njit
-def _move_jaw(state: np.record, command: float) -> None:
+def _move_jaw(state: np.record, speed: float, command: float) -> None:
     """One period of the jaw's ramp, as PandaGripper.format_action: only the sign counts; positive closes."""
-    change = JAW_SPEED * np.sign(command)
+    change = speed * np.sign(command)
     state.jaw[0] = clip(state.jaw[0] - change, -1.0, 1.0)
     state.jaw[1] = clip(state.jaw[1] + change, -1.0, 1.0)
 
@@ -320,10 +334,10 @@ def _task_acceleration(at: np.record, state: np.record, work: np.record) -> None
     _multiply(base_rot, state.goal_rot, work.world_rot)
     velocity = float64s(at.qvel, JOINTS)
     for i in range(3):
-        work.task[i] = KP * (base_pos[i] + dot(base_rot[i], state.goal_pos) - grip_pos[i])
-        work.task[3 + i] = KP * _turn_error(grip_rot, work.world_rot, i)
+        work.task[i] = at.kp * (base_pos[i] + dot(base_rot[i], state.goal_pos) - grip_pos[i])
+        work.task[3 + i] = at.kp * _turn_error(grip_rot, work.world_rot, i)
     for i in range(6):
-        work.task[i] -= KD * dot(work.J[i], velocity)
+        work.task[i] -= at.kd * dot(work.J[i], velocity)
 
 
 @njit

@@ -259,16 +259,14 @@ def finish(
     n: int,
     records: Mapping[int, Record],
     journal: Journal,
-    operator: str | None = None,
-    policy: str | None = None,
     checks: Mapping[str, Any] | None = None,
+    **driver: Any,
 ) -> DemosSummary:
     """Write the first n demonstrations, and count the attempts up to the last of them.
 
     Args:
-        operator: code of the person who drove the robot; None if no person did.
-        policy: name of the policy that drove the robot; None if no policy did.
         checks: settings of the checks before the oracle plays, if they differ from the usual ones.
+        driver: entries of the manifest about who drove the robot: an operator, or a policy and a condition.
     """
     kept = first_of(records, KEPT, n)
     counted = [records[i] for i in sorted(records) if len(kept) < n or i <= kept[-1]]
@@ -283,9 +281,8 @@ def finish(
         reasons=dict(reasons),
         outcomes=outcomes(reasons, len(kept)),
         styles=dict(Counter(row.style for row in journal.rows(kept))),
-        operator=operator,
-        policy=policy,
         checks=checks,
+        **driver,
         **made_with(task),
     )
     written = write_demonstrations(folder, manifest, journal.rows(kept), journal.rows(failed))

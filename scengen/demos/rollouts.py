@@ -1,23 +1,27 @@
 """Rollouts of a policy, kept as demonstrations: of each pool in a separate folder, failures included."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from ..episode import Actions, check_rules
 from ..errors import BadConfig
-from ..evaluate.lines import FOLDER, kept_folder
+from ..evaluate.lines import FOLDER, condition_of, kept_folder
 from ..evaluate.settings import EvaluateSettings, RolloutId
+from ..perturb.perturbation import Perturbation
 from ..pool import Pool
 from ..pool.demonstrations import DEMONSTRATIONS, POLICY, DemonstrationConfig
 from ..pool.files import sha256
-from ..pool.row import DemonstrationRow
+from ..pool.row import DemonstrationRow, PoolRow
 from ..runs.attempts import reported_write_errors
 from ..runs.journal import Journal, Record
+from ..samplers.split import ID, Split
 from ..samplers.task import Task
+from ..scenario import Conditions
+from ..validate.impaired import impaired, impairment_in
 from ..validate.labels import made_with
 from ..validate.playable import stored_world
 from ..validate.rollout import replay
@@ -84,10 +88,16 @@ class _PoolKeeper:
 
     def __init__(self, pool: Pool, task: Task, settings: EvaluateSettings, folder: Path):
         self.pool, self.task, self.settings, self.folder = pool, task, settings, folder
-        about = pool.manifest.config
+        about, condition = pool.manifest.config, condition_of(folder)
+        self.driver: dict[str, Any] = {"policy": settings.name}
+        """Entries of the manifest about the policy."""
+        if condition:
+            self.driver |= {"condition": str(condition), "perturb_seed": settings.perturb_seed}
+        self.conditions = Perturbation.parse(condition.perturbation).conditions(task.embodiment)
+        """Conditions of control under which the scenarios of the pool are posed."""
         self.config = DemonstrationConfig(
             task=about.task,
-            split=about.split,
+            split=_split_under(about.split, self.conditions),
             sampler=about.sampler,
             seed=about.seed,
             runs=settings.rollouts,
@@ -101,8 +111,8 @@ class _PoolKeeper:
     @cached_property
     def journal(self) -> Journal:
         """The journal, opened by the first rollout."""
-        names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "client")
-        identity = {name: getattr(self.settings, name) for name in (*names, "perturb", "perturb_seed")}
+        names = ("version", "observations", "width", "height", "action_filter", "action_repeat", "client")
+        identity = {**self.driver, **{name: getattr(self.settings, name) for name in names}}
         made = {"pool": self.pool.sha256, "config": asdict(self.config), **identity, **made_with(self.task)}
         return Journal(self.folder, made, DEMONSTRATIONS, DemonstrationRow, "to")
 
@@ -117,8 +127,8 @@ class _PoolKeeper:
 
     def add(self, which: RolloutId, actions: Actions) -> None:
         """Play the actions again, and store what they do."""
-        row = self.pool.at(self._places[which.scenario])
-        scenario = self.task.scenario(row.params)
+        row = self._posed(self.pool.at(self._places[which.scenario]))
+        scenario = self.task.scenario(row.params, row.split)
         rules = check_rules(self.config.rules)
         played = replay(scenario, stored_world(row), actions, row.horizon, self.config.settle, rules=rules)
         columns = {name: value for name, value in vars(row).items() if name != "certificate"}
@@ -135,10 +145,23 @@ class _PoolKeeper:
         told = (KEPT, "", "") if played.solved else (FAILED, "solved", f"{played.outcome}: {played.reason}")
         self.journal.add(Record(index, *told, 1, {}, kept, 0.0))
 
+    def _posed(self, row: PoolRow) -> PoolRow:
+        """A row of the pool under the conditions of control: the row of the split that names them."""
+        if self.conditions is None:
+            return row
+        split = _split_under(row.split, self.conditions)
+        scenario = self.task.scenario(row.params, split)
+        text = impaired(row.scene_xml, impairment_in(row.scene_xml, self.conditions, row.id), row.embodiment)
+        labels = {"id": scenario.id, "split": split, "axes": Split.parse(split).axes}
+        return replace(row, **labels, scene_xml=text, scene_sha256=sha256(text))
+
     def finish(self) -> DemosSummary:
         """Write the rollouts that were kept."""
         records = self.journal.records()
         with reported_write_errors(self.folder):
-            return finish(
-                self.folder, self.task, self.config, len(records), records, self.journal, policy=self.settings.name
-            )
+            return finish(self.folder, self.task, self.config, len(records), records, self.journal, **self.driver)
+
+
+def _split_under(split: str, conditions: Conditions | None) -> str:
+    """A split with conditions of control."""
+    return "+".join(part for part in (split, str(conditions or ID)) if part != ID) or ID

@@ -121,7 +121,7 @@ class Judge:
                 yield f"the {name} is {ascii(getattr(row, name))[:60]}, the manifest says {ascii(there)[:60]}"
         if row.task != self.task.name:
             return
-        scenario = self.task.scenario(row.params)
+        scenario = self.task.scenario(row.params, row.split)
         if row.id != scenario.id or as_json(row.params) != canonical(scenario):
             yield OfCode("the id does not belong to the parameters")
         if sha256(row.scene_xml) != row.scene_sha256:
@@ -160,7 +160,7 @@ class Judge:
 
     def _wrong_replay(self, row: DemonstrationRow) -> tuple[list[str], bool]:
         """Faults of the replay, and whether it ended in the same bits."""
-        scenario: Scenario = self.task.scenario(row.params)
+        scenario: Scenario = self.task.scenario(row.params, row.split)
         world = World.load(row.scene_xml, row.embodiment)
         rules = check_rules(self.config.rules)
         again = replay(scenario, world, row.witness, self.task.horizon, self.config.settle, rules=rules)
@@ -371,7 +371,8 @@ class _Verification:
 def _author(manifest: DemonstrationManifest, oracle: bool) -> list[str]:
     """Claims about the driver of the robot."""
     if manifest.source == POLICY:
-        return [f"policy {manifest.policy!a} drove the robot", "no rollout of it was left out"]
+        under = f" under {manifest.condition!a}, seed {manifest.perturb_seed}" if manifest.condition else ""
+        return [f"policy {manifest.policy!a} drove the robot{under}", "no rollout of it was left out"]
     if manifest.source == TELEOP:
         return [f"operator {manifest.operator} drove the robot", "no take was left out"]
     return [] if oracle else ["the oracle played the actions (level=full plays it again)"]

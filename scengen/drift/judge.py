@@ -82,7 +82,7 @@ class Judge:
 
     def __call__(self, row: PoolRow) -> Judgement:
         try:
-            scenario = self.task.scenario(row.params)
+            scenario = self.task.scenario(row.params, row.split)
             if wrong := [*wrong_names(row, scenario), *wrong_hashes(row)]:
                 return lost(row, f"{wrong[0]}; see scengen verify")
             return self._judged(row, scenario)

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import compose
 from ..control.loop import Loop
-from ..control.teleop import check_filter, unfiltered
+from ..control.teleop import check_filter
 from ..episode import STRICT, Actions, Episode, Outcome, Rules, check_rules
 from ..errors import BadConfig, ScengenError, UnknownName, Unstable, cut
 from ..look.looks import ROOM, look_named
@@ -329,7 +329,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._world is None:
             raise BadConfig("no scenario is running; call reset first")
         with self._lock:
-            reward, terminated, truncated, info = self._play(given if self.action_filter else unfiltered(given))
+            reward, terminated, truncated, info = self._play(given)
             return self._observe(), reward, terminated, truncated, info
 
     @property
@@ -389,7 +389,9 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _load(self, row: PoolRow) -> None:
         if self._world is None or row.id != self._row.id:
             self.close()
-            self._world = stored_world(row, self.perturbation.dressed(self.look) if self._needs_pictures else None)
+            look = self.perturbation.dressed(self.look) if self._needs_pictures else None
+            conditions = self.perturbation.conditions(row.embodiment)
+            self._world = stored_world(row, look, conditions, self._perturb_seed)
             self._scenario = self.task.scenario(row.params)
             self.drawn = self.perturbation.senses(
                 self._world.model, row.id, row.task, row.instruction, self._perturb_seed, self._search
@@ -400,20 +402,20 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._world.reset()
         self._episode = Episode(self._scenario, self._world, row.horizon, self.rules)
 
-    def _play(self, given: NDArray[np.float32]) -> tuple[float, bool, bool, dict[str, Any]]:
-        """Take a step with a valid action, clipped unless there is a filter. Returns what `_answer` does."""
+    def _play(self, given: NDArray[np.floating]) -> tuple[float, bool, bool, dict[str, Any]]:
+        """Take a step with a valid action. Returns what `_answer` does."""
         outcome = None
         for _ in range(self.action_repeat):
             outcome = outcome or self._advance(given)
         return self._answer(outcome)
 
-    def _advance(self, action: NDArray[np.float32]) -> Outcome | None:
+    def _advance(self, action: NDArray[np.floating]) -> Outcome | None:
         self._simulate(action)
         return self._episode.judge()
 
-    def _simulate(self, action: NDArray[np.float32]) -> None:
+    def _simulate(self, action: NDArray[np.floating]) -> None:
         """Simulate a control period, which the episode has to judge afterwards."""
-        sent = self.world.filter(action).astype(np.float32) if self.action_filter else action
+        sent = self.world.received(action, not self.action_filter)
         self._played.append(sent)
         self._episode.begin()
         try:
@@ -437,7 +439,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _settled(self) -> tuple[Outcome, str]:
         """Outcome and reason after the robot has been idle for the certificate's settling time."""
         for _ in range(round((self._row.certificate.settle or 0.0) / Loop.PERIOD)):
-            if self._advance(unfiltered(self.world.idle)) != "success":
+            if self._advance(self.world.idle) != "success":
                 break
         return self._episode.settled()
 

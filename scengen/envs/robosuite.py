@@ -145,6 +145,7 @@ class RobosuiteEnv(ManipulationEnv):
                 perturbation affects nothing that is observed.
         """
         self.perturbation, self._perturb_seed = Perturbation.parse(perturb), perturb_seed
+        self.perturbation.check_without_control("robosuite's own controller would ignore it")
         _check_filter_rate(action_filter, control_freq)
         check_rules(rules)
         if reward_shaping:
@@ -184,7 +185,7 @@ class RobosuiteEnv(ManipulationEnv):
     def step(self, action: NDArray[np.float64]) -> tuple[Observations, float, bool, dict[str, Any]]:
         """Step as robosuite does, after the action filter, if there is one."""
         self._begin_episode()  # robosuite allows a step without a reset
-        return super().step(self.world.filter(action) if self.action_filter else action)
+        return super().step(self.world.received(action) if self.action_filter else action)
 
     @property
     def action_spec(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -279,6 +280,11 @@ class RobosuiteEnv(ManipulationEnv):
         super()._setup_references()
         model, data = self.sim.model._model, self.sim.data._data
         self.world = World(model, data, Loop(model, data), len(self.robots) - self._controlled_arms)
+        if self.world.loop.impairment:
+            raise BadConfig(
+                f"{self.row.name} is posed under conditions of control, which robosuite's own controller would ignore; "
+                "play it in the Gymnasium environment"
+            )
 
     def _setup_observables(self) -> Observations:
         observables = super()._setup_observables()

@@ -12,7 +12,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from ..control.teleop import unfiltered
 from ..episode import Outcome
 from ..errors import BadConfig, UnknownName, cut
 from ..pool import PoolRow
@@ -331,7 +330,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         if not np.isfinite(given).all():
             slot = int(np.flatnonzero(~np.isfinite(given).all(axis=1))[0])
             raise ValueError(f"actions must be finite; that of slot {slot} is {np.array2string(given[slot])}")
-        return given if self.envs[0].action_filter else unfiltered(given)
+        return given
 
 
 def _count(name: str, given: Any, most: int) -> int:

@@ -91,6 +91,15 @@ def check_arms(names: Iterable[str]) -> None:
             raise UnknownName("arm", name, [*ARMS, AUTO, NONE])
 
 
+def automatic_arms(lines: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Arms of the inputs that a policy has by the lines of its episodes."""
+    has = {PICTURES: False, LANGUAGE: False}
+    for line in lines:
+        has[PICTURES] |= bool(line["pictures"])
+        has[LANGUAGE] |= bool(line["instruction_read"])
+    return [arm.name for arm in ARMS.values() if arm.automatic and has[arm.needs]]
+
+
 def instruction(arm: str, row: PoolRow, search: Sequence[str] = ()) -> str | None:
     """The instruction that an arm gives instead of the scenario's own; None for its own."""
     give = ARMS[arm].instruct if arm in ARMS else None

@@ -16,20 +16,21 @@ from ..look.looks import look_named
 from ..pool import Pool, kinds
 from ..pool.demonstrations import Demonstrations, is_demonstrations
 from ..pool.manifest import MANIFEST
-from ..pool.untrusted import read_json
 from ..validate.verify.spot import excluded_share
 from ..work.log import different
 from ..work.parallel import UNTRUSTED_LIMITS, each
 from ..work.plain import MAX_JOURNAL, read_plain
-from ..work.typed import typed
+from .arms import CLEAN, automatic_arms
 from .audit_report import Options, ResultsReport
 from .claims import Fault, broken, incomplete, malformed, untrue
 from .comparison import TABLE, Comparison, PolicyResult
-from .lines import CHAIN, CSV, FORMAT, RUN, kept_folder, read_lines
+from .edition import Edition, check_pool
+from .lines import CHAIN, CSV, RUN, kept_folder, read_lines
 from .rebuilding import Rebuilder, Rebuilt, lost
 from .rollouts import Evaluation, here, id_of, order, wanted
 from .scenarios import Scenarios, chosen, known, not_playable
-from .settings import EvaluateSettings, RolloutId
+from .settings import PROFILE, EvaluateSettings, RolloutId
+from .stored import StoredResult, StoredRun, mapping_in, stored_results
 
 
 def audit(folder: Path, options: Options, progress: Callable[[int, int], None]) -> list[ResultsReport]:
@@ -41,8 +42,8 @@ def audit(folder: Path, options: Options, progress: Callable[[int, int], None]) 
     Raises:
         BadConfig: the folder holds no results of this format, or a pool is not here.
     """
-    stored = _mapping(folder / TABLE)
-    audits = [_Audit(folder, told, options) for told in stored.get("policies", [stored])]
+    stored, every = stored_results(folder)
+    audits = [_Audit(folder, told, options) for told in every]
     for one in audits:
         one.run(progress)
     if all(one.readable for one in audits):
@@ -65,8 +66,16 @@ def _other_tables(folder: Path, stored: Mapping[str, Any], audits: Sequence["_Au
             names = different(dict(stored), there) if same else different(_figures(stored), _figures(there))
             if names:
                 yield f"{path.name} has other figures than its lines give: {', '.join(names[:5])}"
-        elif (same or path.name == CSV) and not (path.is_file() and path.read_text() == text):
+        elif (same or path.name == CSV) and _text_in(path) != text:
             yield f"{path} is not the one that its lines give"
+
+
+def _text_in(path: Path) -> str | None:
+    """Text of a file of results, with the ends of lines of this system; None if it cannot be read."""
+    try:
+        return read_plain(path, MAX_JOURNAL).decode().replace("\r\n", "\n")
+    except (ValueError, OSError):
+        return None
 
 
 def _figures(plain: Mapping[str, Any]) -> dict[str, Any]:
@@ -78,22 +87,6 @@ def _figures(plain: Mapping[str, Any]) -> dict[str, Any]:
 
 def _without_words(some: Any) -> Any:
     return [{k: v for k, v in one.items() if k != "told"} for one in some] if isinstance(some, list) else some
-
-
-def _mapping(path: Path) -> dict[str, Any]:
-    """Content of a file of results.
-
-    Raises:
-        BadConfig: it cannot be read, or holds something else.
-    """
-    try:
-        found = read_json(read_plain(path, MAX_JOURNAL).decode(), MAX_JOURNAL)
-    except (ValueError, OSError) as error:
-        why = " ".join(str(error).split())[:160]
-        raise BadConfig(f"{path} cannot be read: {why}; give a folder that scengen evaluate wrote") from None
-    if not isinstance(found, dict):
-        raise BadConfig(f"{path} is not a mapping; give a folder that scengen evaluate wrote")
-    return found
 
 
 def _pool_here(name: str, sha256: str, given: Sequence[Pool]) -> Pool:
@@ -113,49 +106,44 @@ def _pool_here(name: str, sha256: str, given: Sequence[Pool]) -> Pool:
 class _Audit:
     """Verification of the episodes of one policy."""
 
-    def __init__(self, folder: Path, stored: Any, options: Options):
-        if not isinstance(stored, Mapping) or "settings" not in stored:
-            raise BadConfig(f"{folder / TABLE} is of an earlier release, whose lines cannot be rebuilt; evaluate again")
-        self.stored, self.options = stored, options
-        self.folder = folder / str(stored["folder"])
-        self.told = typed("settings", EvaluateSettings, {**stored["settings"], "to": str(self.folder)})
-        self.of_run = _mapping(self.folder / RUN)
-        if (given := self.of_run.get("format")) != FORMAT:
-            raise BadConfig(f"{self.folder / RUN} has format {cut(repr(given), 20)}; this version reads {FORMAT}")
+    def __init__(self, folder: Path, stored: StoredResult, options: Options):
+        self.stored, self.options, self.folder = stored, options, folder / stored.folder
+        self.told = stored.chosen(folder)
+        self.identity = mapping_in(self.folder / RUN)
+        self.of_run = StoredRun.of(self.identity, self.folder / RUN)
         self.lines, self.readable = read_lines(self.folder / kinds.EPISODES), False
         self.report, self.sampled = ResultsReport(str(self.folder), len(self.lines)), 0
-        self._actions: dict[Path, dict[tuple[str, int], Actions]] = {}
+        self._actions: dict[Path, dict[tuple[int, int], Actions]] = {}
         given = [Pool.open(folder).check() for folder in options.pools]
-        named = {**self.of_run["pools"], **stored.get("benign", {})}
+        named = {**self.of_run.pools, **stored.benign}
         self.pools = {name: _pool_here(name, sha256, given) for name, sha256 in named.items()}
 
     @cached_property
     def settings(self) -> EvaluateSettings:
         """Settings of the run, with the folders in which the pools are here."""
-        names = [name for name in self.of_run if name in vars(self.told) and name != "policy"]
+        names = [name for name in vars(self.of_run) if name in vars(self.told) and name != "policy"]
         here = {name: str(pool.folder) for name, pool in self.pools.items()}
-        fresh = [here[name] for name in self.stored.get("benign", {})]
-        usual = [here[name] for name in self.of_run["pools"]]
-        return replace(self.told, pool=usual, benign=fresh, **{name: self.of_run[name] for name in names})
+        fresh = [here[name] for name in self.stored.benign]
+        usual = [here[name] for name in self.of_run.pools]
+        return replace(self.told, pool=usual, benign=fresh, **{name: getattr(self.of_run, name) for name in names})
 
     @property
     def result(self) -> PolicyResult:
         """The result that the lines give."""
         lines = sorted((line for line in self.lines if id_of(line) in self.wanted), key=order)
-        arms = self.stored.get("arms", [])
         end = self.lines[-1][CHAIN] if lines else ""
-        return PolicyResult(self.told, Evaluation(lines, 0, self.lost, arms, self.stored.get("benign", {}), end))
+        return PolicyResult(self.told, Evaluation(lines, 0, self.lost, self.stored.arms, self.stored.benign, end))
 
     def run(self, progress: Callable[[int, int], None]) -> None:
         """Check form, order, completeness and claims of all lines, and rebuild a sample."""
-        if self._tell(malformed(self.lines)):
+        if self._tell(malformed(self.lines)) or self._tell(self._too_many()):
             return
         self.readable = True
-        self._tell(broken(self.of_run, self.lines, self.stored.get("episodes_sha256")))
+        self._tell(broken(self.identity, self.lines, self.stored.episodes_sha256))
         self._tell(incomplete(self.lines, self.wanted))
         self._tell((None, text) for text in self._other_run())
         for number, line in enumerate(self.lines):
-            self._tell((number, text) for text in untrue(line, self._every, self.of_run, self.told.name))
+            self._tell((number, text) for text in untrue(line, self._every, self.identity, self.told.name))
         self._tell(self._crashed_with_actions())
         self._rebuild(progress)
         self._remarks()
@@ -166,22 +154,27 @@ class _Audit:
         self.report.faults += told
         return bool(told)
 
+    def _too_many(self) -> Iterator[Fault]:
+        """More rollouts of a scenario than there are lines: so many are not counted."""
+        if self.told.rollouts > (count := len(self.lines)):
+            yield None, f"{TABLE} says rollouts = {self.told.rollouts}, and there are {count} lines"
+
     # --- what was to be played ----------------------------------------------------------------
 
     @cached_property
     def wanted(self) -> set[RolloutId]:
         """The rollouts of the table."""
         about = {key: told for key, told in self._chosen.items() if key[1] not in self.lost}
-        return wanted(about, self.told) | wanted(about, self.told, self.stored.get("arms", []))
+        return wanted(about, self.told) | wanted(about, self.told, self.stored.arms)
 
     @cached_property
     def lost(self) -> dict[str, str]:
         """Scenarios that the results leave out, with the reasons."""
-        return dict(self.stored.get("lost", {}))
+        return dict(self.stored.lost)
 
     @cached_property
     def _chosen(self) -> Scenarios:
-        fresh = self.stored.get("benign", {})
+        fresh = self.stored.benign
         sides = [[p for name, p in self.pools.items() if (name in fresh) == side] for side in (False, True)]
         some = (chosen(pools, self.settings, self.options.search) for pools in sides if pools)
         return self._as_named({key: told for each in some for key, told in each.items()})
@@ -198,14 +191,13 @@ class _Audit:
 
     def _other_run(self) -> Iterator[str]:
         """Settings of the table that are not those of the run, and scenarios that are left out without a reason."""
-        for name in ("policy", "version", "rules", "perturb_seed", "look"):
-            if self.of_run.get(name) != getattr(self.told, name):
-                yield f"{TABLE} says {name} = {getattr(self.told, name)!r:.60}, {RUN} has {self.of_run.get(name)!r:.60}"
+        yield from self.of_run.contradictions(self.told)
+        yield from self._other_choice()
         look = look_named(self.told.look)
-        if (there := self.of_run.get("look_version")) != look.version:
+        if (there := self.of_run.look_version) != look.version:
             earlier = f"{look.name} {cut(str(there), 20)}"
             self.report.declined.append(f"pictures were taken in look {earlier}, this is {look}")
-        for task, version in self.of_run["task_versions"].items():
+        for task, version in self.of_run.task_versions.items():
             if text := load_task(task, self.options.search).other_version("played on", version):
                 self.report.declined.append(text)
         here = {str(pool.folder): pool for pool in self.pools.values()}
@@ -215,6 +207,23 @@ class _Audit:
         for id_ in sorted(self.lost):
             if id_ not in fails:
                 yield f"{id_} was left out as unplayable, but it can be played"
+
+    def _other_choice(self) -> Iterator[str]:
+        """Arms that are not those of the settings, and pools that are not those of the edition."""
+        chosen = self.told.chosen_arms
+        if chosen is None:
+            chosen = automatic_arms(line for line in self.lines if line["arm"] == CLEAN)
+        if self.stored.arms != chosen:
+            yield f"{TABLE} has the arms {self.stored.arms!r:.60}, its settings give {chosen!r:.60}"
+        if self.told.tasks is not None and self.told.edition is None:
+            yield f"{TABLE} names the tasks {self.told.tasks!r:.60} of an edition, and no edition"
+        if self.told.edition is not None:
+            edition = Edition.read(self.told.edition)
+            for name in self.of_run.pools:
+                try:
+                    check_pool(edition, self.pools[name])
+                except ScengenError as error:
+                    yield f"{TABLE} names edition {edition.name}: {error}"
 
     # --- rebuilding ---------------------------------------------------------------------------
 
@@ -227,7 +236,7 @@ class _Audit:
         numbers = [number for number in some if self._can_be_rebuilt(self.lines[number])]
         numbers.sort(key=lambda number: id_of(self.lines[number]))
         items = [(number, self.lines[number], self._kept(number)) for number in numbers]
-        rebuilder = Rebuilder(self.settings, self.of_run["observed"], self.options.search)
+        rebuilder = Rebuilder(self.settings, self.of_run.observed, self.options.search)
         for done, one in enumerate(each(rebuilder, items, self.options.workers, UNTRUSTED_LIMITS, lost), 1):
             self._count(one)
             progress(done, len(items))
@@ -247,25 +256,38 @@ class _Audit:
     def _kept(self, number: int) -> Actions | None:
         """The actions of a line that were kept."""
         which = id_of(self.lines[number])
-        actions = self._kept_of(which).get((which.scenario, which.rollout))
-        if actions is None and self.of_run.get("keep"):
+        actions = self._kept_of(which).get((self.lines[number]["index"], which.rollout))
+        if actions is None and self.of_run.keep:
             self._tell([(number, f"has no kept actions in {kept_folder(self.folder, which)}")])
         return actions
 
-    def _kept_of(self, which: RolloutId) -> Mapping[tuple[str, int], Actions]:
-        """The kept actions of the folder of a rollout, by scenario and number."""
+    def _kept_of(self, which: RolloutId) -> Mapping[tuple[int, int], Actions]:
+        """The kept actions of the folder of a rollout, by the index of the scenario and the number of the rollout.
+
+        Under conditions of control the scenario has another id there."""
         folder = kept_folder(self.folder, which)
         if folder not in self._actions:
             found = Demonstrations.open(folder) if is_demonstrations(folder) else None
-            rows = [] if found is None else [*found.rows(), *found.failures()]
-            self._actions[folder] = {(row.id, row.run): row.witness for row in rows}
+            rows = [] if found is None else [*found.attempts()]
+            if found is not None:
+                self._tell((None, f"{folder} {text}") for text in self._of_others(found, which))
+            self._actions[folder] = {(row.index, row.run): row.witness for row in rows}
         return self._actions[folder]
+
+    def _of_others(self, found: Demonstrations, which: RolloutId) -> Iterator[str]:
+        """What a folder of kept actions says otherwise than the run."""
+        changed = which.condition
+        wanted = {"policy": self.told.name, "condition": str(changed) if changed else None}
+        wanted["perturb_seed"] = self.told.perturb_seed if changed else None
+        for name, told in wanted.items():
+            if (there := getattr(found.manifest, name)) != told:
+                yield f"says {name} = {there!r:.60}, that of the run is {told!r:.60}"
 
     def _crashed_with_actions(self) -> Iterator[Fault]:
         """Lines of crashes whose episode was played to its end: its actions were kept."""
         for number, line in enumerate(self.lines):
             which = id_of(line)
-            if line["crashed"] and (which.scenario, which.rollout) in self._kept_of(which):
+            if line["crashed"] and (line["index"], which.rollout) in self._kept_of(which):
                 yield number, "says that the policy crashed, but the actions of a whole episode were kept"
 
     # --- what is not known --------------------------------------------------------------------
@@ -289,7 +311,14 @@ class _Audit:
             report.claimed.append(f"outcomes of {count - report.replayed} lines: their actions were not played again")
         if crashed := sum(bool(line["crashed"]) for line in self.lines):
             report.claimed.append(f"that the policy crashed in {crashed} episodes")
-        report.claimed.append("that this policy chose the actions, and whether it read the instruction")
+        if PROFILE in self.told.format:
+            report.claimed.append("plots")
+        perceived = "streams, rate, perturbed readings"
+        report.claimed.append(
+            f"that {cut(self.told.name)} chose the actions, from what it is said to have perceived ({perceived}), "
+            "and whether it read the instruction"
+        )
+        report.claimed.append("that the pools are sound (scengen verify pool=)")
 
     @property
     def versions(self) -> bool:
@@ -300,5 +329,6 @@ class _Audit:
         """Versions and rounding under which lines were played, where they are not those here."""
         for name, there in here().items():
             for other, count in Counter(line[name] for line in self.lines if line[name] != there).items():
-                what = "; their states and outcomes alone are compared" if name == "machine" else ""
+                compared = "their first states and successes alone are compared, reasons and times are claimed"
+                what = f"; {compared}" if name == "machine" else ""
                 yield f"{count} lines were played with {name} {cut(other, 40)}, this is {there}{what}"

@@ -22,7 +22,8 @@ from ..pool.untrusted import read_json
 from ..sim.world import World
 from ..work.plain import MAX_JOURNAL, read_plain
 from ..work.typed import typed
-from .settings import RolloutId
+from .arms import ARMS
+from .settings import Condition, RolloutId
 
 FORMAT = 1
 """Format of the lines."""
@@ -206,6 +207,13 @@ def kept_folder(results: Path, which: RolloutId) -> Path:
     """Folder of the kept actions of a rollout in a folder of results."""
     words = [FOLDER, *([str(which.condition)] if which.condition else [])]
     return results / "-".join(words).replace("/", "-") / Path(which.pool).name
+
+
+def condition_of(folder: Path) -> Condition:
+    """The condition whose actions a folder of `kept_folder` holds."""
+    words = folder.parent.name.split("-")[1:]
+    arms = [word for word in words if word in ARMS]
+    return Condition(*(word for word in words if word not in ARMS), **({"arm": arms[0]} if arms else {}))
 
 
 def read_lines(path: Path) -> list[Any]:

@@ -69,7 +69,7 @@ class Rebuilder:
         row = env._rows[env._rows.find(line["scenario"])]
         env.instruct(instruction(line["arm"], row, self.search) if line["arm"] != CLEAN else None)
         seen, _ = env.reset(options={"scenario": line["scenario"]})
-        scenario = task.scenario(row.params)
+        scenario = task.scenario(row.params, row.split)
         if scenario.id != row.id:
             yield "names a scenario whose id does not belong to the parameters in the pool"
         here = fingerprint() == line["machine"]
@@ -110,7 +110,7 @@ def _wrong_end(
         yield "has another hash or number of actions than the kept ones"
         return
     row, rules = env.row, check_rules(settings.rules)
-    world = stored_world(row)
+    world = stored_world(row, None, env.perturbation.conditions(row.embodiment), settings.perturb_seed)
     again = replay(task.scenario(row.params), world, actions, row.horizon, row.certificate.settle or 0.0, rules=rules)
     found = {"success": again.solved, "reason": again.reason, "lacks": again.lacks}
     exact = {"seconds": round(world.time, 3), "phase": phase(world), "final_state": again.digest}

@@ -24,7 +24,7 @@ from ..work.log import Log
 from ..work.machine import cores
 from ..work.parallel import each
 from ..work.targets import refused, try_folder
-from .arms import ARMS, BENIGN, LANGUAGE, PICTURES
+from .arms import BENIGN, automatic_arms
 from .lines import CHAIN, COLUMNS, FORMAT, RUN, chained, renewed, run_sha256
 from .player import PolicyPlayer, policy_seed
 from .scenarios import Scenarios, chosen, not_playable
@@ -152,10 +152,7 @@ class _Run:
         """The chosen arms; by default those of the inputs that the policy has."""
         if self.settings.chosen_arms is not None:
             return self.settings.chosen_arms
-        lines = self.lines()
-        inputs = ((PICTURES, "pictures"), (LANGUAGE, "instruction_read"))
-        has = {what: any(line[name] for line in lines) for what, name in inputs}
-        return [arm.name for arm in ARMS.values() if arm.automatic and has[arm.needs]]
+        return automatic_arms(self.lines())
 
     def _add(self, record: dict[str, Any]) -> None:
         """Store the line of an episode."""

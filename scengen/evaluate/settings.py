@@ -16,6 +16,7 @@ from ..look.looks import ROOM, look_named
 from ..perturb.perturbation import NONE as NO_PERTURBATION
 from ..perturb.perturbation import Perturbation
 from ..pool import collection
+from ..sim.embodiment import JAW
 from ..work.foreign import is_factory
 from ..work.limits import at_least
 from ..work.parallel import Workers
@@ -181,6 +182,10 @@ class EvaluateSettings:
             raise BadConfig(f"action_repeat = {self.action_repeat}; policy {self.name} acts at 100 Hz: leave it out")
         if set(self.keep) - {EPISODES}:
             raise BadConfig(f"keep = {cut(','.join(self.keep))}; it must be {EPISODES}, or be left out")
+        posed = [each for each in self.perturbations if Perturbation.parse(each).conditions(JAW)]
+        if self.keep and posed and self.perturb_seed:
+            what = f"episodes under {posed[0]} are kept with the values that a pool has"
+            raise BadConfig(f"perturb_seed = {self.perturb_seed}; {what}: leave perturb_seed= out, or keep=")
         if self.keep and not self.settle:
             raise BadConfig("episodes are kept with settle=true alone: leave out keep=")
         if self.remote:

@@ -34,6 +34,7 @@ Kind = Literal[
     "prior",
     "drift",
     "perturb",
+    "control",
 ]
 """Kind of a measurement, and name of its folder in records/.
 
@@ -41,7 +42,8 @@ Kind = Literal[
 `belief`: planners with beliefs of training; `baseline`, `training`: trained policies; `attack`: the adversary; `cheat`:
 cheats of people; `leak`: hidden parameters in observations; `recall`: cheats that the adversary finds again;
 `mutation`: rules left out; `plan`: plans carried out; `prior`: answers that need no look; `drift`: verdicts under other
-versions of MuJoCo; `perturb`: proofs of perturbations.
+versions of MuJoCo; `perturb`: proofs of perturbations; `control`: conditions of control
+under which the oracle succeeds.
 """
 KINDS: tuple[Kind, ...] = get_args(Kind)
 """All kinds."""

@@ -36,6 +36,7 @@ from ..pictures.video import check_size
 from ..pool import collection
 from ..pool.demonstrations import demonstration_folders, is_demonstrations
 from ..pool.row import DemonstrationRow
+from ..sim.embodiment import JAW
 from ..sim.world import World
 from ..validate.playable import stored_world, unplayable
 from ..work.limits import at_least
@@ -144,6 +145,9 @@ class RecordSettings:
         periods_between(self.rate)
         if self.looks > 1 and not self.perturbation:
             raise BadConfig(f"looks = {self.looks}; perturb= makes them differ: give it, or leave looks out")
+        if self.perturbation.conditions(JAW):
+            what = "conditions of control change what happens, and a recording films what has happened"
+            raise BadConfig(f"perturb = {self.perturb}; {what}: give them to demos or generate, as parts of split=")
         if self.perturbation and self.format == ROBOMIMIC:
             raise BadConfig(f"perturb = {self.perturb}; robosuite draws its own pictures: use format={LEROBOT}")
         if self.format == ROBOMIMIC:

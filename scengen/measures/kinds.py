@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from .adversary import Attacks, LeakSearches
 from .axes import Beliefs, Cards
+from .control import Controls
 from .measurement import Measurement
 from .perturbations import Proofs
 from .policies import Baselines, Trainings
@@ -12,6 +13,19 @@ from .understanding import Plans, Priors
 
 MEASUREMENTS: Mapping[str, type[Measurement]] = {
     one.KIND: one
-    for one in (Certified, Cards, Beliefs, Attacks, LeakSearches, Drift, Plans, Priors, Baselines, Trainings, Proofs)
+    for one in (
+        Certified,
+        Cards,
+        Beliefs,
+        Attacks,
+        LeakSearches,
+        Drift,
+        Plans,
+        Priors,
+        Baselines,
+        Trainings,
+        Proofs,
+        Controls,
+    )
 }
 """Measurements by the kind of their rows. Rows of other kinds come from tools of the repository."""

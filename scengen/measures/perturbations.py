@@ -11,7 +11,7 @@ import numpy as np
 from ..look.looks import ROOM
 from ..params import parameters
 from ..perturb.effects import LANGUAGE
-from ..perturb.kinds import LEVELS, kinds
+from ..perturb.kinds import LEVELS, kinds, perceived
 from ..perturb.language import WORDINGS, Words
 from ..samplers.split import ID
 from ..samplers.task import Task
@@ -42,7 +42,7 @@ class Proofs(Measurement):
 
     def jobs(self, task: Task) -> Iterator[Job]:
         if self.chosen(task):
-            strengths = {name: list(kind.strengths) for name, kind in kinds().items()}
+            strengths = {name: list(kind.strengths) for name, kind in perceived().items()}
             yield Job(task, (ID,), {**self.options, "strengths": strengths, "look": str(ROOM)})
 
     def result(self, job: Job) -> Result:
@@ -54,7 +54,7 @@ class Proofs(Measurement):
             played = run(scenario, world_of(scenario, task.embodiment), scenario.oracle, task.horizon)
             made = scenario, rebuild(scenario), task.embodiment, played.actions, words, secrets
             with closing(Stage(*made)) as stage:
-                for kind in (k for k in kinds().values() if k.name not in WORDINGS or words.wordings):
+                for kind in (k for k in perceived().values() if k.name not in WORDINGS or words.wordings):
                     for level in range(1, LEVELS + 1):
                         cells.setdefault((kind.name, level), []).append(stage.proof(kind, level))
         faults = {

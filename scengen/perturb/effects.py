@@ -18,6 +18,7 @@ from ..assets.prop import TABLE_TOP
 from ..geometry import Vec3, rotation
 from ..look.looks import LOOKS, ROOM
 from ..look.room import TABLE, WALL_NAMES
+from ..samplers import conditions
 from .distractors import put
 from .language import CLAUSES, WORDINGS, Words, extended, worded
 
@@ -39,6 +40,8 @@ OBJECTS = "object-state"
 """What a kind changes: poses, velocities and sizes of bodies."""
 LANGUAGE = "the instruction"
 """What a kind changes: the text that a policy is given."""
+CONTROL = "control"
+"""What a kind changes: the conditions of control, see `scengen.samplers.conditions`. It is not neutral."""
 FIXED = "fixed cameras"
 """Cameras that a kind changes: those that stand still."""
 WRIST = "wrist cameras"
@@ -391,5 +394,6 @@ EFFECTS: Mapping[str, Effect] = {
     "object_noise": Effect(_value("sigma"), OBJECTS, on_reading=_noise, varies=False),
     **{kind: _wording(kind) for kind in WORDINGS},
     **{kind: _clauses(kind) for kind in CLAUSES},
+    **{kind: Effect(lambda strength, rng: {}, CONTROL) for kind in conditions.KINDS},
 }
 """What each kind does, by its name. `conf/perturbations` has a file for each, with its strengths."""

@@ -7,7 +7,7 @@ from functools import cache
 from ..errors import BadConfig, UnknownName
 from ..samplers.task_files import conf_dir
 from ..work.plain import read_yaml
-from .effects import EFFECTS, OBJECTS, PICTURES, PROPRIOCEPTION, WRENCH, Effect, is_among
+from .effects import CONTROL, EFFECTS, OBJECTS, PICTURES, PROPRIOCEPTION, WRENCH, Effect, is_among
 
 LEVELS = 5
 """Number of levels of each kind."""
@@ -53,6 +53,11 @@ def kinds() -> Mapping[str, Kind]:
             raise BadConfig(f"{path}: strengths = {list(strengths)}; give {LEVELS} growing positive numbers")
         found[name] = kind
     return found
+
+
+def perceived() -> Mapping[str, Kind]:
+    """The kinds that change what is perceived and leave the physics alone: all but the conditions of control."""
+    return {name: kind for name, kind in kinds().items() if kind.effect.reads != CONTROL}
 
 
 def kind_of(name: str) -> Kind:

@@ -12,9 +12,11 @@ import mujoco
 
 from ..errors import BadConfig
 from ..look.looks import ROOM, Look
+from ..samplers import conditions
+from ..scenario import Conditions
 from .distractors import with_spares
 from .drawn import Drawn, Senses, random
-from .effects import LANGUAGE, PICTURES
+from .effects import CONTROL, LANGUAGE, PICTURES
 from .kinds import LEVELS, affects, kind_of, kinds, stream_kind
 from .language import WORDINGS, Words
 
@@ -66,12 +68,23 @@ class Perturbation:
         """Whether a part shows spare geoms."""
         return any(kinds()[name].effect.is_added for name, _ in self.parts)
 
+    def conditions(self, embodiment: str) -> Conditions | None:
+        """The conditions of control among the parts, for a robot; None if there are none."""
+        parts = tuple(part for part in self.parts if kinds()[part[0]].effect.reads == CONTROL)
+        return Conditions(parts, embodiment) if parts else None
+
+    def check_without_control(self, why: str) -> None:
+        """Raise `BadConfig`, with the reason, if a part is a condition of control."""
+        for name, level in self.parts:
+            if kinds()[name].effect.reads == CONTROL:
+                raise BadConfig(f"perturb = {name}@{level} changes how the arm obeys, and {why}: leave it out")
+
     def dressed(self, look: Look) -> Look:
         """A look of a scene that is to be perturbed: with spare geoms if a part shows them."""
         return with_spares(look) if self.shows_spares else look
 
     def check(self, streams: Sequence[str], cameras: Sequence[str], look: Look = ROOM) -> None:
-        """Raise `BadConfig` if a part affects nothing that is observed. The instruction can always be read.
+        """Raise `BadConfig` if a part affects nothing that is observed. Instruction and control always count.
 
         Args:
             streams: names of the observed streams.
@@ -80,7 +93,7 @@ class Perturbation:
         """
         for name, level in self.parts:
             effect = kinds()[name].effect
-            if effect.reads == LANGUAGE:
+            if effect.reads in (LANGUAGE, CONTROL):
                 continue
             if look.name not in effect.looks:
                 raise BadConfig(
@@ -125,7 +138,8 @@ class Perturbation:
         """
         values = {}
         for name, level in self.parts:
-            rng = random("draw", name, scenario, seed)
-            values[name] = kinds()[name].effect.draw(kinds()[name].strengths[level - 1], rng)
+            effect, rng = kinds()[name].effect, random("draw", name, scenario, seed)
+            drawn = effect.draw(kinds()[name].strengths[level - 1], rng)
+            values[name] = conditions.values(name, level, scenario, seed) if effect.reads == CONTROL else drawn
         starts = tuple(f"{start}{body}_" for body in bodies for start in ("", "seen_"))
         return Drawn(scenario, seed, dict(self.parts), values, starts, words)

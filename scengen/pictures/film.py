@@ -90,6 +90,7 @@ class Take:
         """
         if not self.perturbation:
             return name
+        self.perturbation.check_without_control("a film replays what an arm has done")
         self.perturbation.check((), [name or POLICY_CAMERA], self.look)
         self.scenario.orientation.check_size(width, height)
         return name or POLICY_CAMERA

@@ -110,6 +110,10 @@ class DemonstrationManifest:
     """Code of the person who drove the robot; None if no person did."""
     policy: str | None = None
     """Name of the policy that drove the robot, as `scengen evaluate` takes it; None if no policy did."""
+    condition: str | None = None
+    """What was changed of what the policy perceived, such as `noise@1` or `blind`; None if nothing was."""
+    perturb_seed: int | None = None
+    """Seed of a perturbation of what the policy perceived; None if nothing was changed."""
     checks: Mapping[str, Any] | None = None
     """Settings of the checks before the oracle plays; None for the usual ones of the task."""
 
@@ -188,6 +192,11 @@ def _check(manifest: DemonstrationManifest) -> None:
     if manifest.policy is not None:
         check_text("policy", manifest.policy, MAX_TEXT)
     demand(manifest.operator is None or manifest.policy is None, "an operator and a policy")
+    changed = (manifest.condition, manifest.perturb_seed)
+    demand(changed == (None, None) or (None not in changed and manifest.policy is not None), "a condition, no policy")
+    if manifest.condition is not None:
+        check_text("condition", manifest.condition, MAX_TEXT)
+        check_whole("perturb_seed", manifest.perturb_seed)
     for source, stated in ((TELEOP, manifest.operator), (POLICY, manifest.policy)):
         demand((stated is None) == (source not in config.styles), f"style {source} and its source go together")
         demand(source not in config.styles or len(config.styles) == 1, f"{source} cannot be mixed with other styles")

@@ -87,7 +87,7 @@ def _without_repeated_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def check_plain(value: Any) -> None:
-    """Plain data with finite numbers of at most 64 bits, no deeper than `MAX_DEPTH`."""
+    """Plain data with finite numbers of at most 64 bits and texts of Unicode, no deeper than `MAX_DEPTH`."""
     todo = [(value, 0)]
     while todo:
         inner, depth = todo.pop()
@@ -97,10 +97,20 @@ def check_plain(value: Any) -> None:
             raise Malformed("a number that is not finite")
         if isinstance(inner, int) and abs(inner) >= 2**63:
             raise Malformed("a whole number beyond 64 bits")
+        if isinstance(inner, str) and not inner.isascii():
+            _check_unicode(inner)
         if isinstance(inner, Mapping):
-            todo.extend((v, depth + 1) for v in inner.values())
+            todo.extend((v, depth + 1) for v in (*inner, *inner.values()))
         elif isinstance(inner, list):
             todo.extend((v, depth + 1) for v in inner)
+
+
+def _check_unicode(text: str) -> None:
+    """A text that can be written to a file, without half of a pair of surrogates."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise Malformed(f"{text[:60]!a} is not Unicode") from None
 
 
 def check_mapping(name: str, value: Any) -> Mapping[str, Any]:

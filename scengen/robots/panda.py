@@ -143,6 +143,16 @@ class Names:
         return f"{self.hand}ft_frame"
 
     @property
+    def wrist(self) -> str:
+        """Body that carries the hand."""
+        return f"{self.arm}right_hand"
+
+    @property
+    def load(self) -> str:
+        """Body of a load at the wrist."""
+        return f"{self.arm}load"
+
+    @property
     def cup(self) -> str:
         """Actuator of a suction cup."""
         return f"{self.hand}suction"
@@ -196,7 +206,7 @@ def attach(
     place = scene.worldbody.add_frame(pos=np.asarray(base, float).tolist(), quat=BASE_QUAT.tolist())
     names = Names(number)
     place.attach_body(arm.body("base"), names.arm, "")
-    foot, wrist = scene.body(names.base), scene.body(f"{names.arm}right_hand")
+    foot, wrist = scene.body(names.base), scene.body(names.wrist)
     foot.add_frame().attach_body(mount.body("base"), names.mount, "")
     wrist.add_frame().attach_body(hand.body("right_gripper"), names.hand, "")
     for one, other in CONTACT_FREE_LINKS:

@@ -32,6 +32,7 @@ class GenerateSettings:
     """Settings of `scengen generate`; conf/command/generate.yaml explains them."""
 
     split: str = ID
+    perturb: str = "none"
     sampler: str = "iid"
     n: int = 20
     seed: int = 0

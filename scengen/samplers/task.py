@@ -15,9 +15,9 @@ from ..assets.mesh_prop import MeshProp
 from ..assets.ycb import Scan, Ycb, by_name
 from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
 from ..params import Parameter, Value, parameters, with_values
-from ..scenario import Refutation, Scenario
+from ..scenario import Conditions, Refutation, Scenario
 from ..sim.embodiment import EMBODIMENTS
-from . import designs
+from . import conditions, designs
 from .axis import Axis, Proof
 from .designs import Design, Independent
 from .dists import Dist, Fixed, parse
@@ -142,9 +142,26 @@ class Task:
         """The family's parameters by name."""
         return {p.name: p for p in parameters(self.nominal)}
 
-    def scenario(self, params: Mapping[str, Value]) -> Scenario:
-        """The scenario with these parameter values, such as those of a pool's row."""
-        return with_values(self.nominal, params)
+    def scenario(self, params: Mapping[str, Value], split: Split | str = ID) -> Scenario:
+        """The scenario with these parameter values, such as those of a pool's row, under the conditions of a split."""
+        return with_values(self.nominal, params).under(self.conditions(split))
+
+    def conditions(self, split: Split | str) -> Conditions | None:
+        """Conditions of control that a split names; None if it names none.
+
+        Raises:
+            BadConfig: a kind of conditions has no such level, or is named twice.
+        """
+        parts = [part for part in Split.parse(split).parts if self.is_condition(part)]
+        for part in parts:
+            conditions.check(part)
+        if len({part.axis for part in parts}) < len(parts):
+            raise BadConfig(f"split {split}: a kind of conditions is in it twice; give each once")
+        return Conditions(tuple((p.axis, p.severity or 0) for p in parts), self.embodiment) if parts else None
+
+    def is_condition(self, part: Part) -> bool:
+        """Whether a part of a split is one of the conditions that every task has; an axis of that name comes first."""
+        return part.axis in conditions.KINDS and part.axis not in self.axes
 
     def of_paper(self, axis: Axis) -> bool:
         """Whether an axis is the one that the paper's table of OOD conditions (App. I) has for this task."""
@@ -176,7 +193,7 @@ class Task:
         """
         part = Part.parse(part) if isinstance(part, str) else part
         if part.axis not in self.axes:
-            raise UnknownName(f"split of {self.name}", part.axis, [ID, *self.axes])
+            raise UnknownName(f"split of {self.name}", part.axis, [ID, *self.axes, *conditions.KINDS])
         axis = self.axes[part.axis]
         if part.severity is None:
             return axis
@@ -185,24 +202,25 @@ class Task:
         return severe
 
     def shifts(self, split: Split | str) -> dict[str, Dist]:
-        """The distributions that a split replaces: none for `id`, else those of all its axes.
+        """The distributions that a split replaces: none for `id` and conditions of control, else those of all its axes.
 
         Raises:
             UnknownName: there is no such axis.
-            BadConfig: an axis has no such severity, two axes move the same parameter, or together they lead back into
-                training.
+            BadConfig: an axis or a kind of conditions has no such severity, two axes move the same parameter, or
+                together they lead back into training.
         """
         split = Split.parse(split)
         if split in self._composed:
             return self._composed[split]
-        shifted: dict[str, Dist] = {}
-        for axis in map(self.axis, split.parts):
+        self.conditions(split)
+        shifted, axes = dict[str, Dist](), [part for part in split.parts if not self.is_condition(part)]
+        for axis in map(self.axis, axes):
             if both := shifted.keys() & axis.replace.keys():
                 raise BadConfig(
                     f"split {split}: two of its axes move {', '.join(sorted(both))}; compose axes that differ"
                 )
             shifted.update(axis.replace)
-        if len(split.parts) > 1:
+        if len(axes) > 1:
             self.prove(Axis(str(split), "", "", shifted))
         return self._composed.setdefault(split, shifted)
 
@@ -257,7 +275,9 @@ class Task:
         else:
             shifts, trained = self.shifts(split), self.draw(ID, seed, index, design)
             kept = {name: u for name, u in trained.quantiles.items() if name not in shifts}
-            yield from self._tries(shifts, trained.scenario, kept, seed, index, design)
+            posed = self.conditions(split)
+            for tried in self._tries(shifts, trained.scenario, kept, seed, index, design):
+                yield replace(tried, scenario=tried.scenario.under(posed))
 
     def _tries(
         self,

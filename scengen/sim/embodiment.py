@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compat import from_mjcf
+from ..control.impairment import Impairment
 from ..control.loop import ACTION
 from ..errors import UnknownName
 from ..robots import panda, suction
@@ -60,9 +61,12 @@ def action_size(embodiment: str) -> int:
 
 
 def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjSpec:
-    """A scene from a pool with its robot added, by default without visual geometry.
+    """A scene from a pool with its robot added, and the load of its impairment; by default without visual geometry.
 
     The text is parsed again, so that exactly the scene on disk is simulated.
+
+    Raises:
+        ValueError: MuJoCo does not read the scene, or its impairment has no meaning.
     """
     scene_text.check(scene_xml)
     scene = from_mjcf(scene_xml)
@@ -71,4 +75,27 @@ def compose(scene_xml: str, embodiment: str, visual: bool = False) -> mujoco.MjS
     named = all_hands(embodiment)
     for number, (hand, base) in enumerate(zip(named, panda.bases(len(named)), strict=True)):
         HANDS[hand](scene, visual, number, base)
+    if payload := Impairment.of_spec(scene).payload:
+        for number in range(len(hands(embodiment))):
+            _load(scene, panda.Names(number), payload)
     return scene
+
+
+LOAD = 0.05
+"""Edge of the cube whose inertia a payload has [m]."""
+
+
+def _load(scene: mujoco.MjSpec, names: panda.Names, mass: float) -> None:
+    """Fix a mass to the wrist of an arm, before the sensor of force and torque.
+
+    The controller compensates gravity by MuJoCo's bias forces, which know the mass. A constant force pulls it down once
+    more, so that its weight remains.
+    """
+    load, world = scene.body(names.wrist).add_body(name=names.load), f"{names.load}_axes"
+    load.mass, load.inertia, load.explicitinertial = mass, np.full(3, mass * LOAD**2 / 6.0), True
+    load.add_site(name=names.load)
+    scene.worldbody.add_site(name=world)
+    weight = scene.add_actuator(name=names.load, trntype=mujoco.mjtTrn.mjTRN_SITE, target=names.load, refsite=world)
+    weight.gear[:] = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    weight.gainprm[0], weight.biastype = 0.0, mujoco.mjtBias.mjBIAS_AFFINE
+    weight.biasprm[0] = mass * float(scene.option.gravity[2])

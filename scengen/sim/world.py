@@ -12,8 +12,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..control.impairment import Channel
 from ..control.loop import ACTION, Loop
-from ..control.teleop import Filter
+from ..control.teleop import Filter, unfiltered
 from ..errors import NoEvent, UnknownName, Unstable
 from ..geometry import Mat3, Vec3
 from ..look.looks import Look
@@ -47,7 +48,9 @@ class World:
     scripted: int = 0
     """Number of arms, counted from the last, that the scene's events move instead of actions."""
     filter: Filter = field(init=False)
-    """Teleoperation filter of the actions."""
+    """Teleoperation filter of the actions, which `received` applies."""
+    channel: Channel = field(init=False)
+    """Way of the actions to the controller, which `received` takes."""
     arms: tuple[Arm, ...] = field(init=False)
     """Arms that actions drive. An action holds seven numbers for each, in this order."""
     partners: tuple[Arm, ...] = field(init=False)
@@ -67,6 +70,7 @@ class World:
         this = weakref.proxy(self)
         self.memory = Memory(self.model, self.data, lambda: this.check_event("writing to the memory"))
         self.filter, self.shown = Filter(len(self.arms)), np.zeros(MAX_MEANS)
+        self.channel = Channel(self.loop.impairment, self.size)
 
     @classmethod
     def load(cls, scene_xml: str, embodiment: str = JAW, look: Look | None = None, substeps: int | None = None) -> Self:
@@ -93,7 +97,7 @@ class World:
             scripted: number of arms, counted from the last, that the scene's events move.
         """
         data = mujoco.MjData(model)
-        world = cls(model, data, Loop(model, data), scripted)
+        world = cls(model, data, Loop(model, data, scripted=scripted), scripted)
         world.reset()
         return world
 
@@ -109,6 +113,7 @@ class World:
         self.style = None
         for arm in (*self.arms, *self.partners):
             arm.grip, arm.scripted_action = (1.0 if self.loop.holds and arm.number == 0 else -1.0), IDLE
+        self.channel.reset(self.idle)
 
     @property
     def size(self) -> int:
@@ -124,9 +129,22 @@ class World:
         Raises:
             Unstable: MuJoCo raised a warning.
         """
-        filtered = self.filter(action)
-        self.step_filtered(filtered)
-        return filtered
+        received = self.received(action)
+        self.step_filtered(received)
+        return received
+
+    def received(self, action: ArrayLike, raw: bool = False) -> NDArray[np.float32]:
+        """The action that the controller receives in the coming control period, in which another one is sent.
+
+        Called once in a period. They differ where an impairment of the scene hinders the channel.
+
+        Args:
+            action: shape (7 * arms,), finite.
+            raw: whether it is only clipped, instead of passing the teleoperation filter.
+        """
+        if self.channel.changes:
+            action = self.channel(np.asarray(action), self.idle, round(self.time / Loop.PERIOD))
+        return unfiltered(action) if raw else self.filter(action)
 
     def step_filtered(self, filtered: NDArray[np.float32]) -> None:
         """Advance one control period under an action that has already passed the filter, shape (7 * arms,).
@@ -332,13 +350,15 @@ class World:
 
     def state(self) -> NDArray[np.float64]:
         """Everything that the future depends on, as one vector."""
-        return np.concatenate([self.loop.state(), self.filter.state, self.shown, [arm.grip for arm in self.arms]])
+        grips = [arm.grip for arm in self.arms]
+        return np.concatenate([self.loop.state(), self.channel.state, self.filter.state, self.shown, grips])
 
     def restore(self, state: NDArray[np.float64]) -> None:
         """Continue bit by bit from the `state()` of a world of the same scene."""
-        arms, shown = len(self.arms), len(self.arms) + MAX_MEANS
-        loop, motion, self.shown[:], grips = np.split(state, [-len(self.filter.state) - shown, -shown, -arms])
+        sizes = [len(self.channel.state), len(self.filter.state), MAX_MEANS, len(self.arms)]
+        loop, late, motion, self.shown[:], grips = np.split(state, len(state) - np.cumsum(sizes[::-1])[::-1])
         self.loop.restore(loop)
+        self.channel.state = late
         self.filter.state = motion
         for arm, grip in zip(self.arms, grips, strict=True):
             arm.grip = float(grip)

@@ -19,6 +19,8 @@ from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
 from ..sim.embodiment import JAW, action_size
 from ..sim.world import World
+from .impaired import impaired
+from .rebuilt import posed
 from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
 from .settings import QUICK, CertifySettings
 
@@ -140,9 +142,10 @@ class Trial:
 
     def _compiles(self) -> "Finding":
         try:
-            self.text, lost = scene_text.emit(self.scenario.build())
+            text, lost = scene_text.emit(self.scenario.build())
             if lost:
                 return {}, lost, "the emitted text has lost elements"
+            self.text = posed(text, self.scenario)
             self.world = self._load()
         except (ScengenError, ValueError) as error:
             return {}, {}, f"the scene does not compile: {_one_line(error)}"
@@ -171,7 +174,7 @@ class Trial:
         end, self.solved_after_rest = start, self.solved_at_start
         episode, waiting = Episode(self.scenario, world), self.scenario.pending(world)
         for _ in range(round(limits.seconds / Loop.PERIOD)):
-            if episode.step(world.filter(world.idle)) == "unstable":
+            if episode.step(world.received(world.idle)) == "unstable":
                 return asdict(limits), {}, episode.reason
             if waiting and not self.scenario.pending(world):
                 break  # motion that the event has started does not count
@@ -279,6 +282,8 @@ class Trial:
         numbers = {}
         for name, scene in ablations.items():
             text, _ = scene_text.emit(scene)
+            if self.scenario.conditions:
+                text = impaired(text, self.world.loop.impairment, self.embodiment)
             episode = replay(
                 self.scenario,
                 World.load(text, self.embodiment),

@@ -8,8 +8,10 @@ from ..errors import PoolError, Unstable, cut
 from ..look.looks import Look
 from ..pool.row import NO_WITNESS, SceneRow
 from ..pool.rows import AnyRow
+from ..scenario import Conditions
 from ..sim.world import World
 from ..work.parallel import UNTRUSTED_LIMITS, Workers, apart, each
+from .impaired import impaired, impairment_in
 
 Played = tuple[str, str, Actions]
 """A scene, MJCF, its robot, and actions."""
@@ -26,17 +28,23 @@ def play(what: Played) -> None:
             world.step_filtered(action)
 
 
-def stored_world(row: SceneRow, look: Look | None = None) -> World:
+def stored_world(row: SceneRow, look: Look | None = None, conditions: Conditions | None = None, seed: int = 0) -> World:
     """The world of a stored scene at its start.
 
     Args:
         look: see `World.load`.
+        conditions: other conditions of control than the usual ones.
+        seed: another number draws other values of them.
 
     Raises:
         PoolError: MuJoCo does not read the scene.
+        BadConfig: the scene has no free start under these conditions, or has conditions already.
     """
     with scene_errors(f" of {row.name}"):
-        return World.load(row.scene_xml, row.embodiment, look)
+        text = row.scene_xml
+        if conditions:
+            text = impaired(text, impairment_in(text, conditions, row.id, seed), row.embodiment)
+        return World.load(text, row.embodiment, look)
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.embodiment import JAW
 from ..sim.world import World
+from .impaired import impaired, impairment_in
 
 MAX_RELATIVE_DIFFERENCE = 1e-9
 """Largest relative difference of equal numbers on machines with different rounding."""
@@ -51,8 +52,20 @@ NOT_REBUILT = "the scene is not the one that the family builds from the paramete
 
 
 def rebuild(scenario: Scenario) -> str:
-    """The text of a scenario's scene."""
-    return scene_text.emit(scenario.build())[0]
+    """The text of a scenario's scene, under its conditions."""
+    return posed(scene_text.emit(scenario.build())[0], scenario)
+
+
+def posed(text: str, scenario: Scenario) -> str:
+    """The text of a scenario's scene, given that under the usual conditions.
+
+    Raises:
+        BadConfig: see `impairment_in`.
+    """
+    conditions = scenario.conditions
+    if conditions is None:
+        return text
+    return impaired(text, impairment_in(text, conditions, scenario.under(None).id), conditions.embodiment)
 
 
 def world_of(scenario: Scenario, embodiment: str = JAW) -> World:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .. import html_tables
 from ..control.loop import ACTION, Loop
-from ..control.teleop import MOTION, unfiltered
+from ..control.teleop import MOTION
 from ..episode import STRICT, Actions, Episode, Outcome, Rules
 from ..errors import GaveUp
 from ..samplers.keyed import normals, spread
@@ -180,7 +180,7 @@ class _Planned:
 
     def __init__(self, world: World, planner: Planner, jitter: Jitter | None, raw: bool):
         self.plan, self.world, self.jitter = planner(world), world, jitter
-        self.filter = unfiltered if raw else world.filter
+        self.raw = raw
         self.ended, self.note, self.periods = False, "", 0
         self.delayed: deque[Action] = deque([world.idle] * (jitter.latency if jitter else 0))
 
@@ -191,7 +191,7 @@ class _Planned:
             self.delayed.append(self.jitter.shaken(action, self.periods))
             action = self.delayed.popleft()
         self.periods += 1
-        return self.filter(action)
+        return self.world.received(action, self.raw)
 
     def stop(self) -> None:
         """Called when the goal has been reached: the rest of the plan is not played."""

@@ -167,6 +167,8 @@ SINGLE: dict[str, tuple[str, str, Change]] = {
         r"parameters|redraw|drawn|id ",
         _split("diagonal+light_tiles", ("heading", "tile.mass")),
     ),
+    "conditions_that_no_scene_has": ("single_quick", r"parameters|redraw|drawn|id ", _split("payload@2")),
+    "conditions_of_no_level": ("single_quick", r"level", _split("payload@9")),
     "unknown_axis": ("single_axis", r"split|axis", _split("sideways", ("heading",))),
     "axes_column": ("single_axis", r"axes", _row(axes=["diagonal", "wide_gaps"])),
     "shifted_value": ("single_axis", r"shifted", _row(shifted={"heading": 30.0})),

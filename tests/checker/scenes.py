@@ -18,6 +18,12 @@ SAME = "same"
 """Whether the goal is reached by doing nothing, or by the witness as it was."""
 
 
+def _conditions(name: str, *numbers: float) -> Change:
+    """Conditions of control that the split does not name."""
+    data = " ".join(map(str, numbers))
+    return lambda draft: draft.add(f'<custom><numeric name="impaired_{name}" data="{data}"/></custom>')
+
+
 def _option(draft: Draft, text: str) -> None:
     draft.scene("<option ", f"<option {text} ")
 
@@ -98,6 +104,8 @@ def _aside(body: str, by: float) -> Change:
 SINGLE: dict[str, tuple[Change, str]] = {
     "gravity_sideways": (lambda d: _option(d, 'gravity="0 5 -9.81"'), IDLE),
     "gravity_weaker": (lambda d: _option(d, 'gravity="0 0 -9.5"'), SAME),
+    "slow_gripper": (_conditions("gripper", 0.1), SAME),
+    "easier_start": (_conditions("start", *([0.1] * 7)), SAME),
     "wind": (lambda d: _option(d, 'wind="0 8 0"'), IDLE),
     "thick_air": (lambda d: d.scene('density="1.2"', 'density="1.4"'), SAME),
     "leaning_slab": (_lean, IDLE),

@@ -61,6 +61,16 @@ def test_a_combination_that_makes_no_sense_is_one_line_before_anything_is_made(c
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [("runs=choice(1,2)", "repeat the command for each value of runs"), ("split=id,id", "give each value once")],
+)
+def test_demonstrations_of_a_sweep_that_would_share_a_folder_get_a_remedy(capsys, tmp_path, asked, says):
+    status, shown = said(capsys, "demos", DOMINO, asked, f"to={tmp_path / 'many'}")
+    told = f"2 of the combinations would be written to {tmp_path / 'many' / 'domino_single-id'}; {says}"
+    assert status == 2 and told in shown.err and not list(tmp_path.iterdir())
+
+
 def test_an_axis_of_another_task_of_a_sweep_is_left_out_and_told(capsys):
     asked = compose.combinations("generate", ["task=domino_single,packing", "split=id,tight"])
     kept, runs = generate._valid_runs(asked)

@@ -147,3 +147,12 @@ def test_a_run_is_not_continued_with_other_packages(made, tmp_path, capsys):
 def test_a_subset_keeps_the_file(made, tmp_path):
     assert cli.run(("subset", f"pool={made}", "n=1", f"to={tmp_path / 'some'}")) == 0
     assert (tmp_path / "some" / lock.LOCK_FILE).read_bytes() == (made / lock.LOCK_FILE).read_bytes()
+
+
+def test_a_subset_that_was_killed_when_all_was_written_can_be_repeated(made, tmp_path, capsys):
+    asked = ("subset", f"pool={made}", "n=1", f"to={tmp_path / 'some'}")
+    assert cli.run(asked) == 0
+    written = {path.name: path.read_bytes() for path in (tmp_path / "some").iterdir()}
+    assert cli.run(asked) == 0 and "holds this subset already" in capsys.readouterr().out
+    assert written == {path.name: path.read_bytes() for path in (tmp_path / "some").iterdir()}
+    assert cli.run((*asked[:-1], f"to={made}")) == 2 and "not this subset" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """make demonstrations of new scenarios in several styles, and keep those that succeed"""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -54,9 +55,13 @@ class Run:
 def command(arguments: Arguments) -> int:
     requested = combinations("demos", arguments)
     runs = [_checked(one, len(requested) > 1) for one in requested]
-    folders = [run.settings.to for run in runs]
-    if len(set(folders)) < len(folders):
-        raise BadConfig("two of the combinations would be written to the same folder; sweep task and split alone")
+    folder, times = Counter(run.settings.to for run in runs).most_common(1)[0]
+    if times > 1:
+        others = [name for name in requested[0].swept if name not in ("task", "split")]
+        remedy = (
+            f"repeat the command for each value of {others[0]}, with another to=" if others else "give each value once"
+        )
+        raise BadConfig(f"{times} of the combinations would be written to {folder}; {remedy}")
     statuses = [OK if run().made == run.settings.n else FAILED for run in runs]
     return max(statuses)
 

@@ -11,11 +11,13 @@ from rich.table import Table
 
 from ...compose import Combination, combinations
 from ...errors import BadConfig, ScengenError, cut
+from ...perturb.perturbation import NONE, Perturbation
 from ...pool import collection
 from ...runs.generate import GenerateSettings, Summary, generate
 from ...runs.progress import ProgressBar
+from ...samplers.conditions import KINDS
 from ...samplers.designs import SOBOL
-from ...samplers.split import Split
+from ...samplers.split import ID, Split
 from ...samplers.task import Task
 from ...validate.settings import CertifySettings
 from ..tables import attack_table, funnel_table, summary_lines
@@ -117,9 +119,27 @@ def _progress_note(finished: int, verdicts: Mapping[str, int], rejections: "Coun
 
 def _run(requested: Combination) -> Run:
     settings, task, certify_settings = read_task("generate", requested.overrides, GenerateSettings)
+    settings = _under_conditions(settings, task)
     if settings.ycb is not None:
         task = intake("ycb").with_scans(task, settings.split, settings.ycb)
     return Run(task, certify_settings, settings)
+
+
+def _under_conditions(settings: GenerateSettings, task: Task) -> GenerateSettings:
+    """The settings with the conditions of control of `perturb` as parts of the split."""
+    asked = Perturbation.parse(settings.perturb)
+    if not asked:
+        return settings
+    conditions = asked.conditions(task.embodiment)
+    if conditions is None or len(conditions.parts) < len(asked.parts):
+        seen = [name for name, _ in asked.parts if name not in KINDS]
+        raise BadConfig(
+            f"perturb = {settings.perturb}; {seen[0]} changes what is perceived and no physics, so that certificates "
+            "stay as they are: give it to evaluate, record or an environment. generate certifies under "
+            f"{', '.join(KINDS)}"
+        )
+    parts = [part for part in (settings.split, str(conditions)) if part != ID]
+    return replace(settings, split="+".join(parts), perturb=NONE)
 
 
 def _valid_runs(requested: Sequence[Combination]) -> tuple[list[Combination], list[Run]]:
@@ -147,7 +167,8 @@ def _valid_runs(requested: Sequence[Combination]) -> tuple[list[Combination], li
 
 def _missing(run: Run) -> set[str]:
     """The axes of a run's split that its task does not have."""
-    return {part.axis for part in Split.parse(run.settings.split).parts} - run.task.axes.keys()
+    parts = [part for part in Split.parse(run.settings.split).parts if not run.task.is_condition(part)]
+    return {part.axis for part in parts} - run.task.axes.keys()
 
 
 def _checked(requested: Combination, look: Callable[[Combination], T]) -> T:

@@ -23,6 +23,7 @@ class MeasureSettings:
     kind: str
     splits: str | list[str] | None
     n: int | None
+    runs: int | None
     draws: int | None
     replays: int | None
     level: str | None

@@ -8,7 +8,7 @@ from ...errors import BadConfig, UnknownName
 from ...look.looks import look_named
 from ...ood.analysis.redraw import task_of
 from ...perturb.effects import LANGUAGE
-from ...perturb.kinds import LEVELS, kind_of, kinds
+from ...perturb.kinds import LEVELS, kind_of, perceived
 from ...perturb.language import Words
 from ...perturb.perturbation import Perturbation
 from ...pictures.perturbed import sheet, shows
@@ -47,7 +47,7 @@ def command(arguments: Arguments) -> int:
         raise BadConfig(f"to = {settings.to}; give a .png or .webp file")
     try_file(settings.to)
     every = settings.perturb == EVERY
-    names = kinds() if every else [one.partition("@")[0] for one in settings.perturb.split("+")]
+    names = perceived() if every else [one.partition("@")[0] for one in settings.perturb.split("+")]
     wanted = [kind_of(name) for name in names]
     check_pictures()
     pool = holder(settings.pool, settings.id)

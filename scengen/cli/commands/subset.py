@@ -1,6 +1,8 @@
 """choose the scenarios that cover a pool best, and write them as a new pool"""
 
 import shutil
+import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,7 +10,9 @@ from ...errors import BadConfig
 from ...ood.analysis.coverage import farthest_points
 from ...ood.analysis.redraw import batch_of, task_of
 from ...ood.analysis.space import of_tables
+from ...pool import Pool
 from ...pool.kinds import check_target
+from ...pool.manifest import MANIFEST, Manifest
 from ...pool.writing import write_pool
 from ...samplers.task_files import search_path
 from ...validate import lock
@@ -35,10 +39,9 @@ def command(arguments: Arguments) -> int:
         raise BadConfig(
             f"n = {settings.n}; it must lie in [1, {len(pool)}], because {pool.folder} has {len(pool)} scenarios"
         )
-    check_target(target)
+    check_target(target, MANIFEST)
     check_unfinished(target)
     try_folder(target)
-    locked = lock.read_lock(pool.folder)
     task = task_of(pool, search_path(arguments))
     batch = batch_of(task, pool)
     points = of_tables(task, batch.values).of(batch.values, len(batch))
@@ -46,11 +49,32 @@ def command(arguments: Arguments) -> int:
     about = replace(
         pool.manifest.without_files(), n=settings.n, subset={"of": pool.sha256, "chosen": "max-min coverage"}
     )
+    if Path(target, MANIFEST).exists():
+        return _again(target, pool, about, chosen)
     with appearing(target, folder=True) as part:
-        subset = write_pool(part, about, pool.some(chosen))
-        told = f"pool sha256: {subset.sha256}"
-        if locked is not None:
-            shutil.copyfile(pool.folder / lock.LOCK_FILE, part / lock.LOCK_FILE)
+        subset = _write(part, pool, about, chosen)
     say(f"wrote {settings.n} of {len(pool)} scenarios to {target}")
-    say(told)
+    say(f"pool sha256: {subset}")
+    return OK
+
+
+def _write(folder: Path, pool: Pool, about: Manifest, chosen: Sequence[int]) -> str:
+    """Write the scenarios at some places of a pool as another one, whose hash is returned."""
+    subset = write_pool(folder, about, pool.some(chosen))
+    if lock.read_lock(pool.folder) is not None:
+        shutil.copyfile(pool.folder / lock.LOCK_FILE, folder / lock.LOCK_FILE)
+    return subset.sha256
+
+
+def _again(target: Path, pool: Pool, about: Manifest, chosen: Sequence[int]) -> int:
+    """The end of a command that was repeated, for one that was killed when all was written.
+
+    Raises:
+        BadConfig: the target holds another pool.
+    """
+    with tempfile.TemporaryDirectory() as made:
+        same = _write(Path(made), pool, about, chosen) == Pool.open(target).check().sha256
+    if not same:
+        raise BadConfig(f"{target} is a pool already, and not this subset; choose another to=")
+    say(f"{target} holds this subset already")
     return OK

@@ -23,6 +23,7 @@ from ...look.looks import Look
 from ...perturb.drawn import Senses
 from ...perturb.perturbation import Perturbation
 from ...pictures.render import Camera, NoPictures, Picture
+from ...samplers.split import ID
 from ...samplers.task import Task
 from ...scenario import Scenario
 from ...sim.embodiment import hands
@@ -191,7 +192,8 @@ def _fault(recorded: Recorded, explanation: str, row: int | None = None, **numbe
 
 def _replayed(recorded: Recorded) -> Replayed:
     task = recorded.task
-    scenario, robot = task.scenario(recorded.params), task.embodiment
+    split = str(recorded.told.get("scengen/split", ID))
+    scenario, robot = task.scenario(recorded.params, split), task.embodiment
     text = rebuild(scenario)
     perturbation = Perturbation.parse(str(recorded.told.get("scengen/perturb", "")))
     world = World.load(text, robot, perturbation.dressed(recorded.look) if recorded.films else None)

@@ -244,7 +244,13 @@ class Run:
         """Write the demonstrations so far."""
         settings = self.settings
         return finish(
-            self.folder, self.source.task, self.config, settings.n, self.records, self._journal, settings.operator
+            self.folder,
+            self.source.task,
+            self.config,
+            settings.n,
+            self.records,
+            self._journal,
+            operator=settings.operator,
         )
 
     def _add(self, record: Record) -> None:

@@ -199,7 +199,7 @@ class Session:
         self.phase, self.message = RUNNING, ""
 
     def _step(self, action: NDArray[np.float64]) -> None:
-        self._actions.append(self.world.filter(action))
+        self._actions.append(self.world.received(action))
         self.episode.step(self._actions[-1])
         if len(self._actions) % MOMENT_PERIODS == 0 and self.episode.outcome is None:
             self._remember()

@@ -150,7 +150,7 @@ def _observed(task: Task, bodies: Mapping[str, bool], split: str, seed: int, ind
     before, episode = read(), Episode(scenario, world)
     try:
         for _ in range(round(IDLE_TIME / Loop.PERIOD)):
-            episode.step(world.filter(world.idle))
+            episode.step(world.received(world.idle))
     except Unstable:
         return None
     after = read()

@@ -107,7 +107,7 @@ class Examiner:
         if row.task != claims.task.name:
             return Examination(row.id, "refuted", tuple(reasons))
         try:
-            scenario = claims.task.scenario(row.params)
+            scenario = claims.task.scenario(row.params, row.split)
         except ScengenError as error:
             return self._judged(row, [*reasons, OfCode(str(error))])
         reasons += [*wrong_names(row, scenario), *wrongly_drawn(row, claims)]

@@ -115,7 +115,7 @@ def certified_here(row: PoolRow, claims: Claims, adversary: Adversary | None) ->
     """
     task = claims.task
     try:
-        scenario = task.scenario(row.params)
+        scenario = task.scenario(row.params, row.split)
         again = certify(scenario, task.horizon, claims.settings, task.embodiment, adversary=adversary).certificate
     except (ScengenError, ValueError, ArithmeticError) as error:
         return f"certified again against version {task.version} it cannot be: {' '.join(str(error).split())[:200]}"
