@@ -179,8 +179,7 @@ def _check_perturbation(settings: AgentSettings, row: PoolRow, search: Sequence[
     given = streams(row.embodiment, settings.pictures)
     seen = [camera for name, camera in cameras.items() if name in given]
     perturbation.check([name for name in given if name not in cameras], seen)
-    words = Words.of(row.task, row.instruction, search)
-    perturbation.of(row.id, words=words).instruction  # noqa: B018  (it raises an error)
+    perturbation.check_words(Words.of(row.task, row.instruction, search))
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ INSTRUCTION = "instruction"
 """Name of the text among the changes."""
 DARK = 64
 """Grey level below which a pixel of a white picture is covered."""
-SEEN = ("light_", "cam_", "geom_rgba", "mat_", "site_rgba", "tex_", "vis")
+SEEN = ("light_", "cam_", "geom_rgba", "geom_matid", "mat_", "site_rgba", "tex_", "vis")
 """Beginnings of the names of what pictures alone use in a compiled scene."""
 
 PLACES = ("geom_type", "geom_size", "geom_pos", "geom_quat")

@@ -73,6 +73,12 @@ class Perturbation:
         parts = tuple(part for part in self.parts if kinds()[part[0]].effect.reads == CONTROL)
         return Conditions(parts, embodiment) if parts else None
 
+    def check_words(self, words: Words) -> None:
+        """Raise `BadConfig` if a task lacks what a part needs: other wordings, or things that no text names."""
+        for name, level in self.parts:
+            if lacks := words.lacks(name):
+                raise BadConfig(f"perturb = {name}@{level}: {lacks}")
+
     def check_without_control(self, why: str) -> None:
         """Raise `BadConfig`, with the reason, if a part is a condition of control."""
         for name, level in self.parts:
@@ -123,7 +129,7 @@ class Perturbation:
             search: folders of other packages, see `task_files.search_path`.
         """
         bodies = [model.body(number).name for number in range(model.nbody)] if self else ()
-        words = Words.of(task, instruction, search) if self.has_words else None
+        words = Words.of(task, instruction, search) if self else None
         senses = Senses(self.of(scenario, seed, bodies, words))
         senses.drawn.on_model(model)
         return senses
@@ -134,7 +140,7 @@ class Perturbation:
         Args:
             scenario: its id.
             bodies: names of the bodies of its scene. Readings of others stay 0.
-            words: the instruction and others, for a part that changes it.
+            words: what is said in the task, for a part that changes it, or things that it does not name.
         """
         values = {}
         for name, level in self.parts:

@@ -93,7 +93,9 @@ def command(arguments: Arguments) -> int:
     check_pictures()
     perturbation = Perturbation.parse(settings.perturb)
     take, words = _take(settings, arguments)
-    take = replace(take, look=look_named(settings.look), perturbation=perturbation, perturb_seed=settings.perturb_seed)
+    perturbation.check_words(words)
+    perturbed = {"perturbation": perturbation, "perturb_seed": settings.perturb_seed, "words": words}
+    take = replace(take, look=look_named(settings.look), **perturbed)
     if perturbation.has_words:
         said = perturbation.of(take.scenario.id, settings.perturb_seed, words=words)
         say(f"the instruction is: {said.instruction}")
