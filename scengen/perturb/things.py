@@ -90,13 +90,12 @@ class _Clear:
     """Choice of colours that are clear of those of other things and of the table."""
 
     def __init__(self, model: mujoco.MjModel, bodies: Collection[str]):
-        shown = [g for g in scene_geoms(model) if model.geom_group[g] < HIDDEN_GROUP and model.geom_rgba[g, 3] > 0]
-        free = {g for g in shown if model.geom_rgba[g, 3] == 1.0 and _is_named(model, g, bodies)}
+        free = free_geoms(model, bodies)
         self.things: dict[Colour, list[int]] = {}
         """Geoms whose look carries no meaning, by their colours."""
-        for geom in sorted(free):
+        for geom in free:
             self.things.setdefault(_colour(model, geom), []).append(geom)
-        others = {_colour(model, geom) for geom in [*({*shown} - free), model.geom("table_top").id]}
+        others = {_colour(model, geom) for geom in [*({*_shown(model)} - {*free}), model.geom("table_top").id]}
         self._others = [lab(colour) for colour in sorted(others)]
         self._taken: list[tuple[NDArray[np.float64], Path]] = []
         """Colours of things that have another one, before and at `SHARES`."""
@@ -142,9 +141,20 @@ class _Clear:
         return bool((turn(path, other)[chroma(path) >= CHROMATIC] < least - 1e-9).any())
 
 
-def _is_named(model: mujoco.MjModel, geom: int, bodies: Collection[str]) -> bool:
-    name = model.body(model.geom_bodyid[geom]).name
-    return any(fnmatchcase(name, pattern) for pattern in bodies)
+def free_geoms(model: mujoco.MjModel, bodies: Collection[str]) -> list[int]:
+    """Numbers of the opaque geoms of bodies that one of some patterns names."""
+
+    def is_named(geom: int) -> bool:
+        name = model.body(model.geom_bodyid[geom]).name
+        return any(fnmatchcase(name, pattern) for pattern in bodies)
+
+    return [geom for geom in _shown(model) if model.geom_rgba[geom, 3] == 1.0 and is_named(geom)]
+
+
+def _shown(model: mujoco.MjModel) -> list[int]:
+    """Numbers of the geoms of things that pictures show."""
+    every = scene_geoms(model)
+    return [geom for geom in every if model.geom_group[geom] < HIDDEN_GROUP and model.geom_rgba[geom, 3] > 0]
 
 
 def _colour(model: mujoco.MjModel, geom: int) -> Colour:
