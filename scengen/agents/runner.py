@@ -101,7 +101,7 @@ class AgentSettings:
     def check(self) -> None:
         """Raise `ScengenError` if a setting is not valid."""
         at_least(self, seeds=1, width=16, explore=0, perturb_seed=0)
-        self.perturbation.check_perceived("make a pool under it with generate perturb=, and ask about that")
+        self.perturbation  # noqa: B018  (it raises an error)
         self.budget.check()
         if not 0.0 < self.timeout <= 86_400.0:
             raise BadConfig(f"timeout = {self.timeout:g}; it must lie in (0, 86400] s")
@@ -174,11 +174,12 @@ def works(settings: AgentSettings, search: Sequence[str] = ()) -> list[Work]:
 def _check_perturbation(settings: AgentSettings, row: PoolRow, search: Sequence[str]) -> None:
     """Raise `BadConfig` if the model is given nothing that the perturbation affects, or the task has no other text."""
     cameras, perturbation = cameras_of(row.embodiment), settings.perturbation
+    if settings.stage != ACT:
+        perturbation.check_perceived("only stage=3 acts; leave it out")
     given = streams(row.embodiment, settings.pictures)
     seen = [camera for name, camera in cameras.items() if name in given]
     perturbation.check([name for name in given if name not in cameras], seen)
-    words = Words.of(row.task, row.instruction, search)
-    perturbation.of(row.id, words=words).instruction  # noqa: B018  (it raises an error)
+    perturbation.check_words(Words.of(row.task, row.instruction, search))
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from ..installation import versions
 from ..look.looks import PLAIN, ROOM, Look, look_named
 from ..orientation import Orientation
 from ..perturb.drawn import Senses
+from ..perturb.language import Words
 from ..perturb.perturbation import Perturbation
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
@@ -204,6 +205,8 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
     recorded = recorded_streams(robot, list(tasks.values()), bodies, settings.observed, settings.privileged)
     views = [cameras_of(robot)[name] for name in settings.camera_names]
     settings.perturbation.check([*recorded.streams], views, settings.shown or ROOM)
+    for name, task in tasks.items():
+        settings.perturbation.check_words(Words.of(name, task.instruction, search))
     failed, left_out, styles = list[str](), dict[str, str](), Counter[str]()
     with appearing(settings.to, folder=settings.format == LEROBOT) as path:
         scenarios = count // settings.looks

@@ -12,7 +12,7 @@ from ..look.looks import ROOM
 from ..params import parameters
 from ..perturb.effects import LANGUAGE
 from ..perturb.kinds import LEVELS, kinds, perceived
-from ..perturb.language import WORDINGS, Words
+from ..perturb.language import Words
 from ..samplers.split import ID
 from ..samplers.task import Task
 from ..validate.rebuilt import rebuild, world_of
@@ -54,7 +54,7 @@ class Proofs(Measurement):
             played = run(scenario, world_of(scenario, task.embodiment), scenario.oracle, task.horizon)
             made = scenario, rebuild(scenario), task.embodiment, played.actions, words, secrets
             with closing(Stage(*made)) as stage:
-                for kind in (k for k in perceived().values() if k.name not in WORDINGS or words.wordings):
+                for kind in (k for k in perceived().values() if not words.lacks(k.name)):
                     for level in range(1, LEVELS + 1):
                         cells.setdefault((kind.name, level), []).append(stage.proof(kind, level))
         faults = {

@@ -18,6 +18,7 @@ from ..perturb.effects import LANGUAGE, PICTURES
 from ..perturb.kinds import LEVELS, Kind, affects, stream_kind
 from ..perturb.language import Words, leaks, other_words
 from ..perturb.perturbation import Perturbation
+from ..perturb.things import free_geoms
 from ..pictures.perturbed import changed_by
 from ..pictures.render import Camera, Picture
 from ..pictures.views import things
@@ -49,12 +50,14 @@ INSTRUCTION = "instruction"
 """Name of the text among the changes."""
 DARK = 64
 """Grey level below which a pixel of a white picture is covered."""
-SEEN = ("light_", "cam_", "geom_rgba", "mat_", "site_rgba", "tex_", "vis")
+SEEN = ("light_", "cam_", "geom_rgba", "geom_matid", "mat_", "site_rgba", "tex_", "vis")
 """Beginnings of the names of what pictures alone use in a compiled scene."""
 
 PLACES = ("geom_type", "geom_size", "geom_pos", "geom_quat")
 """Names of what distractors change of spare geoms besides."""
 
+Where = NDArray[np.bool_] | None
+"""Pixels of a camera; None: all."""
 Ids = Mapping[str, NDArray[np.int32]]
 """Number of the body in each pixel, by camera."""
 
@@ -148,13 +151,16 @@ class Stage:
             if kind.effect.reads != PICTURES:
                 return Proof(not changed, self._reading_changes(kind, drawn))
             seen = [name for name, camera in self.cameras.items() if affects(kind.effect, camera)]
+            shown = self._shown(kind)
+            seen = [name for name in seen if any(name in each for each in shown)]
             changes, hidden = dict.fromkeys(seen, 0.0), set[str]()
             for number, period in enumerate(self.moments):
                 at = max(0, period - round(drawn.delay / Loop.PERIOD))
                 is_drawn = bool(changed) or at != period
                 pictures = self._pictures(at, seen) if is_drawn else self.clean[number]
-                for name in seen:
-                    far = self._far(drawn, name, period, pictures[name], self.clean[number][name])
+                for name in (name for name in seen if name in shown[number]):
+                    clean, where = self.clean[number][name], shown[number][name]
+                    far = self._far(drawn, name, period, pictures[name], clean, where)
                     changes[name] = max(changes[name], far)
                 if not kind.effect.is_passing:
                     is_elsewhere = at != period or any(name.startswith("cam_") for name in changed)
@@ -163,6 +169,15 @@ class Stage:
             if level == LEVELS and changed:
                 neutral = neutral and self._played()[1] == self.digest
             return Proof(neutral, changes, tuple(sorted(hidden)), is_crossed=self._is_crossed())
+
+    def _shown(self, kind: Kind) -> list[Mapping[str, Where]]:
+        """Pixels over which a kind is judged, by camera, for each moment: all; of a kind that changes things those that
+        show them, in cameras that show enough of them."""
+        if kind.effect.on_things is None:
+            return [dict.fromkeys(self.cameras)] * len(self.moments)
+        bodies = np.unique(self.world.model.geom_bodyid[free_geoms(self.world.model, self.words.free)])
+        every = ({name: np.isin(seen, bodies) for name, seen in ids.items()} for ids in self.ids)
+        return [{name: where for name, where in each.items() if where.sum() >= MIN_PIXELS} for each in every]
 
     def _is_spare(self, name: str, rows: NDArray[np.int64]) -> bool:
         """Whether only spare geoms differ in an array."""
@@ -186,12 +201,14 @@ class Stage:
         changes = {INSTRUCTION: other_words(text, given)}
         return Proof(neutral, changes, leaks=tuple(leaks(text, given, self.secrets)))
 
-    def _far(self, drawn: Drawn, name: str, period: int, picture: Picture, clean: Picture) -> float:
+    def _far(
+        self, drawn: Drawn, name: str, period: int, picture: Picture, clean: Picture, where: Where = None
+    ) -> float:
         """Distance of a camera's picture from the clean one; of passing ones the mean over some periods."""
         passing = any(effect.is_passing for effect in drawn.effects.values())
         periods = range(period, period + (PASSING if passing else 1))
         found = (drawn.on_picture(picture, self.cameras[name], each) for each in periods)
-        return float(np.mean([distance(one, clean) for one in found]))
+        return float(np.mean([distance(one, clean, where) for one in found]))
 
     def _played(self) -> tuple[list[NDArray[np.float64]], str]:
         """States of the witness from the start on, one for each control period, and the hash of the last one."""

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import Loop
+from ..errors import BadConfig
 from ..samplers.keyed import unit
-from .effects import OBJECTS, Effect, Picture, Reading, Values, number_in
+from .effects import EFFECTS, OBJECTS, Effect, Picture, Reading, Values, number_in
 from .kinds import affects, kinds, stream_kind
 from .language import WORDINGS, Words
 
@@ -65,9 +66,19 @@ class Drawn:
         return max((number_in(values, "seconds") for values in late), default=0.0)
 
     def on_model(self, model: mujoco.MjModel) -> None:
-        """Change lights, colours and cameras of a compiled scene, once."""
-        for name, values in self.values.items():
-            self.effects[name].on_model(model, values)
+        """Change lights, colours and cameras of a compiled scene, once.
+
+        Raises:
+            BadConfig: the task names no body whose look carries no meaning, for a part that changes such bodies.
+        """
+        for name in (n for n in EFFECTS if n in self.values):  # things before the table, whose colour they avoid
+            effect, values = self.effects[name], self.values[name]
+            if effect.on_things is not None:
+                assert self.words is not None, "who draws for things gives the words of their task"
+                if lacks := self.words.lacks(name):
+                    raise BadConfig(f"{name}: {lacks}")
+                effect.on_things(model, values, self.words.free)
+            effect.on_model(model, values)
 
     @contextmanager
     def while_applied(self, model: mujoco.MjModel) -> Iterator[Mapping[str, NDArray[np.int64]]]:

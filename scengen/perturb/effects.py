@@ -21,6 +21,7 @@ from ..look.room import TABLE, WALL_NAMES
 from ..samplers import conditions
 from .distractors import put
 from .language import CLAUSES, WORDINGS, Words, extended, worded
+from .things import EDGE, paint, print_on
 
 Values = Mapping[str, float | Sequence[float]]
 """Drawn values of a perturbation in an episode, by name, as they are stored."""
@@ -68,6 +69,8 @@ class Effect:
     """Cameras in which it shows."""
     on_model: Callable[[mujoco.MjModel, Values], None] = lambda model, values: None
     """Changes the compiled scene."""
+    on_things: Callable[[mujoco.MjModel, Values, Collection[str]], None] | None = None
+    """Changes things in the compiled scene, given patterns of the names of bodies whose look carries no meaning."""
     on_picture: Callable[[Picture, Values, Random], Picture] | None = None
     """Changes a picture; the random numbers belong to the picture's time and camera."""
     on_reading: Callable[[Sequence[str], Reading, Values, Random], Reading] | None = None
@@ -81,7 +84,8 @@ class Effect:
     looks: Collection[str] = tuple(LOOKS)
     """Names of the looks that show it."""
     is_added: bool = False
-    """Whether it shows spare geoms, with which the scene must be compiled (`scengen.perturb.distractors`)."""
+    """Whether it shows spare geoms or a spare material, with which the scene must be compiled
+    (`scengen.perturb.distractors.with_spares`)."""
     is_late: bool = False
     """Whether pictures arrive `seconds` late."""
 
@@ -208,6 +212,24 @@ PATTERNS: Sequence[Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[
     lambda rows, columns: (np.hypot(rows % 1.0 - 0.5, columns % 1.0 - 0.5) > 0.3).astype(float),
 )
 """Checks, stripes and dots on a tile: 0 or 1 at places that are given in cells."""
+
+
+def _keyed(strength: float, rng: Random) -> Values:
+    return {"share": strength, "key": int(rng.integers(2**31))}
+
+
+def _paint_things(model: mujoco.MjModel, values: Values, bodies: Collection[str]) -> None:
+    paint(model, number_in(values, "share"), round(number_in(values, "key")), bodies)
+
+
+def _patterned(strength: float, rng: Random) -> Values:
+    return {**_keyed(strength, rng), "cells": int(rng.integers(2, 5)), "kind": int(rng.integers(len(PATTERNS)))}
+
+
+def _print_things(model: mujoco.MjModel, values: Values, bodies: Collection[str]) -> None:
+    key, cells, kind = (round(number_in(values, name)) for name in ("key", "cells", "kind"))
+    shade = PATTERNS[kind](*(np.indices((EDGE, EDGE)) * cells / EDGE))
+    print_on(model, number_in(values, "share"), key, shade, bodies)
 
 
 def _show_things(model: mujoco.MjModel, values: Values) -> None:
@@ -361,6 +383,8 @@ def _clauses(kind: str) -> Effect:
 
 
 EFFECTS: Mapping[str, Effect] = {
+    "thing_texture": Effect(_patterned, on_things=_print_things, looks=ROOM_ONLY, is_added=True),
+    "thing_colour": Effect(_keyed, on_things=_paint_things),
     "light_direction": Effect(_flat_axis, on_model=_turn_light),
     "light_intensity": Effect(_brighter, on_model=_scale("diffuse", "head_ambient", "head_diffuse")),
     "light_colour": Effect(_tint, on_model=_scale("diffuse", "head_ambient", "head_diffuse")),

@@ -1,4 +1,5 @@
-"""Other wordings of a task's instruction, from `conf/language`, and what each kind of perturbation makes of them."""
+"""Other wordings of a task's instruction, from `conf/language`, and what each kind of perturbation makes of them; and
+what no words are about: bodies whose look may change, from `conf/things`."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,6 +19,8 @@ WORDINGS = ("reworded", "terse", "vague", "foreign")
 """Kinds that replace the instruction by a text of `conf/language/<task>.yaml`."""
 CLAUSES = ("verbose", "distracting")
 """Kinds that add sentences of `conf/language/clauses.yaml`."""
+THINGS = ("thing_colour", "thing_texture")
+"""Kinds that change the look of bodies of `conf/things/<task>.yaml`."""
 TEXTS = 5
 """Number of texts of each wording."""
 MAX_TEXT = 400
@@ -33,16 +36,45 @@ class Words:
     instruction: str
     wordings: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
     """Texts of each kind in `WORDINGS`."""
+    free: tuple[str, ...] = ()
+    """Patterns of the names of bodies whose look no text, rule or goal depends on."""
 
     @classmethod
     def of(cls, task: str, instruction: str, search: Sequence[str] = ()) -> "Words":
-        """The words of a task, without wordings if no file has them.
+        """The words of a task, without wordings or free bodies if no file has them.
 
         Raises:
             BadConfig: the file is damaged.
         """
-        path = task_files.file_of_group(task, "language", search)
-        return cls(task, instruction, wordings(path) if path else {})
+        path, things = (task_files.file_of_group(task, group, search) for group in ("language", "things"))
+        return cls(task, instruction, wordings(path) if path else {}, free_bodies(things) if things else ())
+
+    def lacks(self, kind: str) -> str:
+        """What the task lacks for a kind, and the remedy; empty if nothing."""
+        if kind in WORDINGS and not self.wordings:
+            return f"{self.task} has no other wordings; write {', '.join(WORDINGS)} to conf/language/{self.task}.yaml"
+        if kind in THINGS and not self.free:
+            return (
+                f"{self.task} names no body whose look carries no meaning; if there is one, list it in "
+                f"conf/things/{self.task}.yaml"
+            )
+        return ""
+
+
+@cache
+def free_bodies(path: Path) -> tuple[str, ...]:
+    """The patterns in a file of a task.
+
+    Raises:
+        BadConfig: it holds anything but a list of names, `bodies`.
+    """
+    node = read_yaml("bodies", path)
+    names = node.get("bodies") if {*node} == {"bodies"} else node
+    if not isinstance(names, list) or not all(isinstance(name, str) and 0 < len(name) <= MAX_TEXT for name in names):
+        raise BadConfig(
+            f"{path}: {cut(repr(names))}; give names of bodies, such as `bodies: [box, tile_*]`, and nothing else"
+        )
+    return tuple(names)
 
 
 @cache
@@ -83,9 +115,8 @@ def worded(kind: str, number: int, words: Words) -> str:
     Raises:
         BadConfig: the task has none.
     """
-    if not words.wordings:
-        file = f"conf/language/{words.task}.yaml"
-        raise BadConfig(f"{kind}: {words.task} has no other wordings; write {', '.join(WORDINGS)} to {file}")
+    if lacks := words.lacks(kind):
+        raise BadConfig(f"{kind}: {lacks}")
     return words.wordings[kind][number - 1]
 
 

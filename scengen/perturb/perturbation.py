@@ -87,6 +87,12 @@ class Perturbation:
         """Whether all parts change the instruction, and nothing else."""
         return bool(self) and all(kinds()[name].effect.reads == LANGUAGE for name, _ in self.parts)
 
+    def check_words(self, words: Words) -> None:
+        """Raise `BadConfig` if a task lacks what a part needs: other wordings, or things that no text names."""
+        for name, level in self.parts:
+            if lacks := words.lacks(name):
+                raise BadConfig(f"perturb = {name}@{level}: {lacks}")
+
     def dressed(self, look: Look) -> Look:
         """A look of a scene that is to be perturbed: with spare geoms if a part shows them."""
         return with_spares(look) if self.shows_spares else look
@@ -131,7 +137,7 @@ class Perturbation:
             search: folders of other packages, see `task_files.search_path`.
         """
         bodies = [model.body(number).name for number in range(model.nbody)] if self else ()
-        words = Words.of(task, instruction, search) if self.has_words else None
+        words = Words.of(task, instruction, search) if self else None
         senses = Senses(self.of(scenario, seed, bodies, words))
         senses.drawn.on_model(model)
         return senses
@@ -142,7 +148,7 @@ class Perturbation:
         Args:
             scenario: its id.
             bodies: names of the bodies of its scene. Readings of others stay 0.
-            words: the instruction and others, for a part that changes it.
+            words: what is said in the task, for a part that changes it, or things that it does not name.
         """
         values = {}
         for name, level in self.parts:

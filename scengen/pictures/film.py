@@ -16,6 +16,7 @@ from ..errors import UnknownName
 from ..look.looks import ROOM, Look
 from ..means import MISSED, OPEN, SHOWN
 from ..perturb.drawn import Drawn
+from ..perturb.language import Words
 from ..perturb.perturbation import Perturbation
 from ..pool import PoolRow
 from ..scenario import Scenario
@@ -55,6 +56,8 @@ class Take:
     """Perturbation of the pictures, which then are those that a policy sees."""
     perturb_seed: int = field(default=0, kw_only=True)
     """Seed of the perturbation."""
+    words: Words | None = field(default=None, kw_only=True)
+    """What is said in the task, for a perturbation of things that it does not name."""
 
     @classmethod
     def witness(cls, row: PoolRow, scenario: Scenario) -> "Take":
@@ -80,7 +83,7 @@ class Take:
     @cached_property
     def drawn(self) -> Drawn:
         """What is drawn for its perturbation."""
-        return self.perturbation.of(self.scenario.id, self.perturb_seed)
+        return self.perturbation.of(self.scenario.id, self.perturb_seed, words=self.words)
 
     def camera(self, name: str | None, width: int, height: int) -> str | None:
         """The camera that films it, given the requested one; None for the fitted view.
@@ -90,6 +93,7 @@ class Take:
         """
         if not self.perturbation:
             return name
+        self.perturbation.check_perceived("a film replays what an arm has done; film a pool of generate perturb=")
         self.perturbation.check((), [name or POLICY_CAMERA], self.look)
         self.scenario.orientation.check_size(width, height)
         return name or POLICY_CAMERA

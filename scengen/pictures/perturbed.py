@@ -10,6 +10,7 @@ from ..look.looks import Look
 from ..perturb.distractors import with_spares
 from ..perturb.drawn import Drawn
 from ..perturb.kinds import LEVELS, Kind, affects
+from ..perturb.language import Words
 from ..perturb.perturbation import Perturbation
 from ..pool import PoolRow
 from ..scenario import Scenario
@@ -71,6 +72,7 @@ def sheet(
     look: Look,
     size: int,
     seed: int,
+    words: Words,
     progress: Progress = lambda done, total: None,
 ) -> Picture:
     """A row of pictures for each kind that changes pictures of the camera: clean, and at each level.
@@ -80,6 +82,7 @@ def sheet(
         look: look of the pictures.
         size: width and height of each picture [pixels].
         seed: seed of the perturbations.
+        words: what is said in the task.
     """
     shown = [kind for kind in kinds if shows(kind, camera, look)]
     levels = [Perturbation(((kind.name, level),)) for kind in shown for level in range(1, LEVELS + 1)]
@@ -87,7 +90,7 @@ def sheet(
     with closing(Start(row, scenario, look, size)) as start:
         clean = start.picture(camera)
         for perturbation in levels:
-            picture = start.picture(camera, perturbation.of(row.id, seed))
+            picture = start.picture(camera, perturbation.of(row.id, seed, words=words))
             pictures.append(captioned(picture, str(perturbation)))
             progress(len(pictures), len(levels))
     first = captioned(clean, "clean")

@@ -188,6 +188,7 @@ def test_a_dry_run_writes_prompts_and_asks_nothing(tmp_path, capsys):
         ({"perturb": "noise"}, "give noise a level from 1 to 5"),
         ({"perturb": "noise@1"}, "affects all cameras, and none is observed"),
         ({"perturb": "object_noise@1", "mode": "poses", "stage": 3}, "affects streams of object-state"),
+        ({"perturb": "payload@1"}, "only stage=3 acts"),
         ({"perturb": "terse@1", "perturb_seed": -1}, "perturb_seed = -1"),
     ],
 )

@@ -199,8 +199,8 @@ def test_conditions_upon_conditions_and_films_of_what_happened_are_refused(tmp_p
         posed = Conditions((("payload", 1),), JAW)
         stored_world(type(row)(**{**vars(row), "scene_xml": text}), None, posed)
     for words, told in {
-        ("show", "film", f"pool={REFERENCE}", "id=8ed4", f"to={tmp_path / 'f.png'}"): "film that",
-        ("agent", f"pool={REFERENCE}", "model=x", "endpoint=http://localhost:1"): "ask about that",
+        ("show", "film", f"pool={REFERENCE}", "id=8ed4", f"to={tmp_path / 'f.png'}"): "film a pool of",
+        ("agent", f"pool={REFERENCE}", "model=facts", "stage=1", f"to={tmp_path / 'a'}"): "only stage=3 acts",
     }.items():
         assert cli.run([*words, "perturb=payload@1"]) == 2 and told in capsys.readouterr().err
     words = ["record", f"pool={REFERENCE}", f"to={tmp_path / 'r'}", "perturb=payload@1"]

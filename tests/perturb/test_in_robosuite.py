@@ -125,6 +125,7 @@ def test_the_instruction_is_perturbed(row):
         ("noise@1", {}, BadConfig, "affects all cameras, and none is observed"),
         ("object_noise@1", {"use_object_obs": False}, BadConfig, "affects streams of object-state"),
         ("wrench_noise@1", {}, BadConfig, "affects streams of wrench"),
+        ("stiffness@1", {}, BadConfig, "robosuite's own controller would ignore it"),
         ("nois@1", {}, UnknownName, "did you mean 'noise'"),
         ("table_texture@1", {}, BadConfig, f"shows in look=room, not in {PLAIN.name}"),
     ],

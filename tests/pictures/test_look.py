@@ -18,9 +18,11 @@ from scengen.compose import load_task
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig, UnknownName
 from scengen.evaluate.policies import make_policy
+from scengen.look.colour import CHROMATIC, chroma, lab, turn
 from scengen.look.finish import OF_COLOURS, OF_PARTS
 from scengen.look.looks import LOOKS, PLAIN, ROOM, look_named, look_of, look_told
 from scengen.perturb.drawn import arrays
+from scengen.perturb.kinds import kind_of
 from scengen.pictures.render import Camera
 from scengen.pictures.views import things
 from scengen.pool import Pool
@@ -33,8 +35,6 @@ drawing = pytest.mark.skipif(not pictures_are_possible(), reason="no OpenGL")
 VIEWS = ("agentview", "frontview", "sideview", "birdview")
 MIN_PIXELS = 30
 """Least number of pixels of a colour whose median is compared."""
-MIN_CHROMA = 25.0
-"""Least chroma of a stored colour that has a hue to be recognised."""
 MAX_TURN = 25.0
 """Largest difference of the hue of a thing in a picture from that of its stored colour [deg]."""
 APART = 30.0
@@ -43,20 +43,6 @@ MIN_DISTANCE = 12.0
 """Least distance of such colours in pictures: five times what people just see."""
 MIN_FROM_TABLE = (8.0, 5.0)
 """Least distance of a colour of a thing in pictures from the table, under the key light and in its shade."""
-
-
-def lab(rgb):
-    """CIELAB of sRGB colours from 0 to 1, shape (..., 3), under D65."""
-    rgb = np.asarray(rgb, float)
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    xyz = linear @ np.array([[0.4124, 0.2126, 0.0193], [0.3576, 0.7152, 0.1192], [0.1805, 0.0722, 0.9505]])
-    share = xyz / [0.9505, 1.0, 1.089]
-    x, y, z = np.moveaxis(np.where(share > 0.008856, np.cbrt(share), 7.787 * share + 16 / 116), -1, 0)
-    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
-
-
-def hue(colour):
-    return np.degrees(np.arctan2(colour[..., 2], colour[..., 1]))
 
 
 def scene(name):
@@ -81,14 +67,21 @@ def pixels_by_colour(eye):
     return {colour: np.median(every, axis=0) for colour, every in best.items()}
 
 
-def colours(name):
-    """Colours of the things of a task in its pictures, with the key light and in its shade."""
+def lit(name, change=lambda model: None):
+    """The world of a task with everything uncovered, under a light that was changed."""
     text, embodiment = scene(name)
     world = World.load(text, embodiment, ROOM)
+    change(world.model)
     for body in world.free_bodies:
         if body.startswith("lid"):  # uncover what is below
             world.data.qpos[world.model.joint(f"{body}_free").qposadr[0] + 2] += 5.0
     mujoco.mj_forward(world.model, world.data)
+    return world
+
+
+def colours(name):
+    """Colours of the things of a task in its pictures, with the key light and in its shade."""
+    world = lit(name)
     with closing(Camera(world, 256, 256)) as eye:
         yield pixels_by_colour(eye)
         world.model.light_diffuse[world.model.light_castshadow.astype(bool)] = 0.0
@@ -100,15 +93,52 @@ def colours(name):
 def test_colours_stay_recognisable_also_in_shade(name):
     for found, away in zip(colours(name), MIN_FROM_TABLE, strict=True):
         table = found.pop("table")
-        stored = {colour: lab(colour) for colour in found}
+        check_recognisable(found, found)
         for colour, seen in found.items():
-            if np.hypot(*stored[colour][1:]) >= MIN_CHROMA:
-                turn = abs((hue(seen) - hue(stored[colour]) + 180) % 360 - 180)
-                assert turn <= MAX_TURN, (colour, seen)
             assert np.linalg.norm(seen - table) > away, (colour, seen, table)
-        for one, other in itertools.combinations(found, 2):
-            if np.linalg.norm(stored[one] - stored[other]) >= APART:
-                assert np.linalg.norm(found[one] - found[other]) >= MIN_DISTANCE, (one, other)
+
+
+def check_recognisable(found, hued):
+    """Hues of the colours `hued` that have one stay, and things of different colours stay different."""
+    for colour, seen in found.items():
+        if colour in hued and chroma(lab(colour)) >= CHROMATIC:
+            assert turn(seen, lab(colour)) <= MAX_TURN, (colour, seen)
+    for one, other in itertools.combinations(found, 2):
+        if np.linalg.norm(lab(one) - lab(other)) >= APART:
+            assert np.linalg.norm(found[one] - found[other]) >= MIN_DISTANCE, (one, other)
+
+
+@drawing
+@pytest.mark.parametrize("name", list_tasks())
+def test_colours_stay_recognisable_in_warm_and_cold_light(name):
+    """Red stays red and yellow yellow at the highest level of `light_colour`, whichever way it goes."""
+    with closing(Camera(lit(name), 256, 256)) as eye:
+        hued = {colour for colour, seen in pixels_by_colour(eye).items() if chroma(seen) >= CHROMATIC}
+    shift, effect = kind_of("light_colour").strengths[-1], kind_of("light_colour").effect
+    for sign in (-1.0, 1.0):
+        values = {"factor": [1.0 + sign * shift, 1.0, 1.0 - sign * shift]}
+        with closing(Camera(lit(name, lambda model, values=values: effect.on_model(model, values)), 256, 256)) as eye:
+            found = pixels_by_colour(eye)
+        found.pop("table")
+        check_recognisable(found, hued)
+
+
+@drawing
+def test_a_light_that_takes_colours_away_is_found():
+    """The negative control: a lamp of sodium."""
+    sodium = {"factor": [1.0, 0.55, 0.0]}
+    effect = kind_of("light_colour").effect
+    with closing(Camera(lit("domino_single", lambda model: effect.on_model(model, sodium)), 256, 256)) as eye:
+        found = pixels_by_colour(eye)
+    found.pop("table")
+    with pytest.raises(AssertionError):
+        check_recognisable(found, found)
+
+
+def test_the_distances_of_colours_are_those_of_skimage():
+    color = pytest.importorskip("skimage.color")
+    rgb = np.random.default_rng(0).random((100, 3))
+    np.testing.assert_allclose(lab(rgb), color.rgb2lab(rgb), atol=0.1)
 
 
 def digest(world, actions):

@@ -70,7 +70,7 @@ class FilmSettings:
         if self.raw and self.of == WITNESS:
             raise BadConfig("raw = true plays a shortcut without the filter; give one as of=NAME, or leave raw out")
         look_named(self.look)
-        Perturbation.parse(self.perturb).check_perceived("make a pool under it with generate perturb=, and film that")
+        Perturbation.parse(self.perturb)
         at_least(self, frames=1, fps=1, width=1, height=1, perturb_seed=0)
         check_format(Path(self.to), self.frames, self.fps, self.width, self.height)
 
@@ -93,7 +93,9 @@ def command(arguments: Arguments) -> int:
     check_pictures()
     perturbation = Perturbation.parse(settings.perturb)
     take, words = _take(settings, arguments)
-    take = replace(take, look=look_named(settings.look), perturbation=perturbation, perturb_seed=settings.perturb_seed)
+    perturbation.check_words(words)
+    perturbed = {"perturbation": perturbation, "perturb_seed": settings.perturb_seed, "words": words}
+    take = replace(take, look=look_named(settings.look), **perturbed)
     if perturbation.has_words:
         said = perturbation.of(take.scenario.id, settings.perturb_seed, words=words)
         say(f"the instruction is: {said.instruction}")

@@ -55,19 +55,20 @@ def command(arguments: Arguments) -> int:
     cameras = cameras_of(row.embodiment)
     if settings.camera not in cameras:
         raise UnknownName("camera", settings.camera, cameras)
-    camera = cameras[settings.camera]
+    camera, words = cameras[settings.camera], Words.of(row.task, row.instruction, search_path(arguments))
     for kind in () if every else wanted:
         if kind.effect.reads == LANGUAGE:
             continue
         Perturbation(((kind.name, 1),)).check((), [camera], look)
+        Perturbation(((kind.name, 1),)).check_words(words)
         if not shows(kind, camera, look):
             raise BadConfig(f"perturb = {kind.name}; a single picture does not show it")
-    words = Words.of(row.task, row.instruction, search_path(arguments))
     scenario = task_of(pool, search_path(arguments)).scenario(row.params)
+    wanted = [kind for kind in wanted if not words.lacks(kind.name)]
     drawn = [kind for kind in wanted if shows(kind, camera, look)]
     if drawn:
         with ProgressBar(err, "sheet", 1) as bar:
-            picture = sheet(row, scenario, drawn, camera, look, settings.size, settings.seed, bar.of)
+            picture = sheet(row, scenario, drawn, camera, look, settings.size, settings.seed, words, bar.of)
         write(Path(settings.to), encode(picture, Path(settings.to).suffix[1:]))
     for kind in wanted:
         say(f"{kind.name}: {', '.join(f'{each:g}' for each in kind.strengths)} {kind.unit}. {kind.why}")

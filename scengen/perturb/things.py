@@ -1,0 +1,161 @@
+"""Other colours and textures for things whose look carries no meaning.
+
+`conf/things/<task>.yaml` names their bodies. Whatever they get, they stay as far from all other things and from the
+table as people need to tell them apart, and take no hue that another thing has, which a text may name.
+"""
+
+from collections.abc import Callable, Collection
+from fnmatch import fnmatchcase
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..look.colour import CHROMATIC, chroma, lab, turn
+from ..sim.world import scene_geoms
+
+APART = 30.0
+"""Distance in CIELAB that other colours keep from those of other things, if it was as large before."""
+OTHER_HUE = 50.0
+"""Difference of hues that they keep from those of other things, if it was as large before [deg]: red from orange."""
+FAR = 45.0
+"""Distance in CIELAB from the present colour from which on another one is taken at once."""
+TRIES = 100
+"""Number of colours that are tried."""
+SHARES = np.linspace(0.0, 1.0, 11)[1:, None]
+"""Shares of another colour at which it must be clear of others, shape (n, 1)."""
+HIDDEN_GROUP = 3
+"""Lowest group of geoms that pictures do not show."""
+PRINT = "spare_print"
+"""Name of a spare material and its texture, with which scenes are compiled."""
+EDGE = 64
+"""Edge of each face of the texture [pixels]."""
+FACES = 6
+"""Number of faces: the texture is a cube, so that it covers meshes as well."""
+
+Colour = tuple[float, ...]
+Path = NDArray[np.float64]
+"""Colours in CIELAB at `SHARES`, shape (n, 3)."""
+
+
+def add_print(spec: mujoco.MjSpec) -> None:
+    """Add the spare material to a scene."""
+    texture = spec.add_texture(name=PRINT, type=mujoco.mjtTexture.mjTEXTURE_CUBE, width=EDGE, height=EDGE)
+    texture.builtin, texture.rgb1 = mujoco.mjtBuiltin.mjBUILTIN_FLAT, np.ones(3)
+    made = spec.add_material(name=PRINT)
+    made.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = PRINT
+    made.specular, made.shininess = 0.1, 0.2
+
+
+def paint(model: mujoco.MjModel, share: float, key: int, bodies: Collection[str]) -> None:
+    """Mix the colours of things with others; things of one colour stay of one colour.
+
+    Args:
+        share: share of the other colours.
+        key: seed of the other colours.
+        bodies: patterns of the names of the bodies.
+    """
+    rng, clear = np.random.default_rng(key), _Clear(model, bodies)
+    for rgb, geoms in sorted(clear.things.items()):
+        other = clear.chosen(rng, [rgb], lambda one, target: _mixed(np.array(one), target, SHARES))
+        model.geom_rgba[geoms, :3] = _mixed(np.array(rgb), other, np.array(share))
+
+
+def print_on(
+    model: mujoco.MjModel, share: float, key: int, shade: NDArray[np.float64], bodies: Collection[str]
+) -> None:
+    """Print a pattern on things, which multiplies their colours.
+
+    Args:
+        share: share of the tint of the pattern.
+        key: seed of the tint.
+        shade: 0 where the pattern has the tint and 1 where it is white, shape (`EDGE`, `EDGE`).
+        bodies: patterns of the names of the bodies.
+    """
+    rng, clear, white = np.random.default_rng(key), _Clear(model, bodies), np.ones(3)
+    tint = clear.chosen(rng, [*clear.things], lambda rgb, target: _mixed(white, target, SHARES) * rgb, white)
+    colours = shade[..., None] + (1.0 - shade[..., None]) * _mixed(white, tint, np.array(share))
+    material = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL, PRINT)
+    texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB])
+    start, size = model.tex_adr[texture], FACES * EDGE * EDGE * 3
+    model.tex_data[start : start + size] = np.tile((255.0 * colours).round().astype(np.uint8).ravel(), FACES)
+    model.geom_matid[[geom for geoms in clear.things.values() for geom in geoms]] = material
+
+
+def _mixed(rgb: NDArray[np.float64], other: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+    return (1.0 - share) * rgb + share * other
+
+
+class _Clear:
+    """Choice of colours that are clear of those of other things and of the table."""
+
+    def __init__(self, model: mujoco.MjModel, bodies: Collection[str]):
+        free = free_geoms(model, bodies)
+        self.things: dict[Colour, list[int]] = {}
+        """Geoms whose look carries no meaning, by their colours."""
+        for geom in free:
+            self.things.setdefault(_colour(model, geom), []).append(geom)
+        others = {_colour(model, geom) for geom in [*({*_shown(model)} - {*free}), model.geom("table_top").id]}
+        self._others = [lab(colour) for colour in sorted(others)]
+        self._taken: list[tuple[NDArray[np.float64], Path]] = []
+        """Colours of things that have another one, before and at `SHARES`."""
+
+    def chosen(
+        self,
+        rng: np.random.Generator,
+        colours: Collection[Colour],
+        ways: Callable[[Colour, NDArray[np.float64]], NDArray[np.float64]],
+        kept: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Another colour for things, shape (3,): the first clear one that is `FAR`, or the farthest clear one.
+
+        Args:
+            colours: present colours of the things.
+            ways: function of a present colour and another one, which returns the colours at `SHARES`.
+            kept: what is chosen if none is clear; by default the present colour.
+        """
+        best, farthest = np.array(next(iter(colours))) if kept is None else kept, 0.0
+        before = [lab(colour) for colour in colours]
+        for target in rng.uniform(0.05, 0.95, (TRIES, 3)):
+            paths = [lab(ways(colour, target)) for colour in colours]
+            far = min(float(np.linalg.norm(p[-1] - b)) for p, b in zip(paths, before, strict=True))
+            if far > farthest and all(self._is_clear(*each) for each in zip(before, paths, strict=True)):
+                best, farthest = target, far
+                if far >= FAR:
+                    break
+        self._taken += zip(before, (lab(ways(colour, best)) for colour in colours), strict=True)
+        return best
+
+    def _is_clear(self, before: NDArray[np.float64], path: Path) -> bool:
+        """Whether a thing stays apart from all others on a path from its present colour."""
+        for other, way in [*((each, each[None]) for each in self._others), *self._taken]:
+            away, was = np.linalg.norm(path - way, axis=1).min(), np.linalg.norm(before - other)
+            if away < min(APART, was) - 1e-9:
+                return False
+        return not any(self._has_hue(before, path, other) for other in self._others if chroma(other) >= CHROMATIC)
+
+    @staticmethod
+    def _has_hue(before: NDArray[np.float64], path: Path, other: NDArray[np.float64]) -> bool:
+        """Whether a thing comes near the hue of another one that it did not have."""
+        least = min(OTHER_HUE, float(turn(before, other))) if chroma(before) >= CHROMATIC else OTHER_HUE
+        return bool((turn(path, other)[chroma(path) >= CHROMATIC] < least - 1e-9).any())
+
+
+def free_geoms(model: mujoco.MjModel, bodies: Collection[str]) -> list[int]:
+    """Numbers of the opaque geoms of bodies that one of some patterns names."""
+
+    def is_named(geom: int) -> bool:
+        name = model.body(model.geom_bodyid[geom]).name
+        return any(fnmatchcase(name, pattern) for pattern in bodies)
+
+    return [geom for geom in _shown(model) if model.geom_rgba[geom, 3] == 1.0 and is_named(geom)]
+
+
+def _shown(model: mujoco.MjModel) -> list[int]:
+    """Numbers of the geoms of things that pictures show."""
+    every = scene_geoms(model)
+    return [geom for geom in every if model.geom_group[geom] < HIDDEN_GROUP and model.geom_rgba[geom, 3] > 0]
+
+
+def _colour(model: mujoco.MjModel, geom: int) -> Colour:
+    return tuple(model.geom_rgba[geom, :3].astype(float).round(3).tolist())
