@@ -17,7 +17,7 @@ FORMS: Mapping[str, tuple[str, ...]] = {
     "show": ("film", "view", "perturb"),
     "report": ("audit", "compare"),
     "export": ("recipe", "hub"),
-    "evaluate": ("power",),
+    "evaluate": ("power", "threshold"),
     "axis": ("card", "cues", "discover", "shrink"),
 }
 """Second words that some commands take, each a form of the command with its own settings: `scengen show film`."""
@@ -55,6 +55,7 @@ CONTINUING = (
     "demos pad",
     "train",
     "evaluate",
+    "evaluate threshold",
     "edition",
     "agent",
     "attack",

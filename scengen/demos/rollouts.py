@@ -43,12 +43,10 @@ class Keeper:
         names = [Path(folder).name for folder in settings.folders]
         if twice := {name for name in names if names.count(name) > 1}:
             raise BadConfig(f"several pools are in folders named {twice.pop()}; rename one to keep their episodes")
-        self.settings = settings
-        self._pools = {str(pool.folder): pool for pool in map(Pool.open, settings.every_folder)}
-        self._tasks = {name: task_of_manifest(pool, tasks[pool.task]) for name, pool in self._pools.items()}
+        self.settings, self._tasks = settings, tasks
         self._kept: dict[Path, _PoolKeeper] = {}
-        for folder, pool in self._pools.items():
-            for earlier in sorted(settings.folder.glob(f"{FOLDER}*/{pool.folder.name}")):
+        for folder in settings.every_folder:
+            for earlier in sorted(settings.folder.glob(f"{FOLDER}*/{Path(folder).name}")):
                 self._keeper(folder, earlier)
 
     def __call__(self, which: RolloutId, actions: Actions) -> None:
@@ -62,7 +60,9 @@ class Keeper:
     def _keeper(self, pool: str, folder: Path) -> "_PoolKeeper":
         """The keeper that writes a folder."""
         if folder not in self._kept:
-            self._kept[folder] = _PoolKeeper(self._pools[pool], self._tasks[pool], self.settings, folder)
+            opened = Pool.open(pool)
+            task = task_of_manifest(opened, self._tasks[opened.task])
+            self._kept[folder] = _PoolKeeper(opened, task, self.settings, folder)
         return self._kept[folder]
 
     def finish(self) -> list[DemosSummary]:

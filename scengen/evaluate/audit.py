@@ -31,6 +31,11 @@ from .rollouts import Evaluation, here, id_of, order, wanted
 from .scenarios import Scenarios, chosen, known, not_playable
 from .settings import PROFILE, EvaluateSettings, RolloutId
 from .stored import StoredResult, StoredRun, mapping_in, stored_results
+from .threshold.pools import LevelPools
+from .threshold.result import ThresholdResult
+from .threshold.search import Search, outcomes_of
+from .threshold.settings import ThresholdSettings
+from .threshold.shift import Shift
 
 
 def audit(folder: Path, options: Options, progress: Callable[[int, int], None]) -> list[ResultsReport]:
@@ -81,7 +86,7 @@ def _text_in(path: Path) -> str | None:
 def _figures(plain: Mapping[str, Any]) -> dict[str, Any]:
     """The figures of a table without words about them, of each policy."""
     every = [told if isinstance(told, dict) else {} for told in plain.get("policies", [plain])]
-    names = ("table", "conditions", "interactions", "episodes_sha256")
+    names = ("table", "conditions", "interactions", "threshold", "episodes_sha256")
     return {f"{k}.{name}": _without_words(told.get(name)) for k, told in enumerate(every) for name in names}
 
 
@@ -115,7 +120,7 @@ class _Audit:
         self.report, self.sampled = ResultsReport(str(self.folder), len(self.lines)), 0
         self._actions: dict[Path, dict[tuple[int, int], Actions]] = {}
         given = [Pool.open(folder).check() for folder in options.pools]
-        named = {**self.of_run.pools, **stored.benign}
+        named = {**self.of_run.pools, **stored.benign, **stored.drawn}
         self.pools = {name: _pool_here(name, sha256, given) for name, sha256 in named.items()}
 
     @cached_property
@@ -124,7 +129,7 @@ class _Audit:
         names = [name for name in vars(self.of_run) if name in vars(self.told) and name != "policy"]
         here = {name: str(pool.folder) for name, pool in self.pools.items()}
         fresh = [here[name] for name in self.stored.benign]
-        usual = [here[name] for name in self.of_run.pools]
+        usual = [here[name] for name in (*self.of_run.pools, *self.stored.drawn)]
         return replace(self.told, pool=usual, benign=fresh, **{name: getattr(self.of_run, name) for name in names})
 
     @property
@@ -132,7 +137,11 @@ class _Audit:
         """The result that the lines give."""
         lines = sorted((line for line in self.lines if id_of(line) in self.wanted), key=order)
         end = self.lines[-1][CHAIN] if lines else ""
-        return PolicyResult(self.told, Evaluation(lines, 0, self.lost, self.stored.arms, self.stored.benign, end))
+        stored = self.stored
+        found = Evaluation(lines, 0, self.lost, stored.arms, stored.benign, end, stored.drawn)
+        if isinstance(self.told, ThresholdSettings):
+            return ThresholdResult(self.told, found, self._shift(self.told))
+        return PolicyResult(self.told, found)
 
     def run(self, progress: Callable[[int, int], None]) -> None:
         """Check form, order, completeness and claims of all lines, and rebuild a sample."""
@@ -164,8 +173,22 @@ class _Audit:
     @cached_property
     def wanted(self) -> set[RolloutId]:
         """The rollouts of the table."""
+        if isinstance(self.told, ThresholdSettings):
+            return self._searched(self.told)
         about = {key: told for key, told in self._chosen.items() if key[1] not in self.lost}
         return wanted(about, self.told) | wanted(about, self.told, self.stored.arms)
+
+    def _searched(self, told: ThresholdSettings) -> set[RolloutId]:
+        """The rollouts of a search, which follow one after the other from the outcomes that the lines claim."""
+        here = {name: str(pool.folder) for name, pool in self.pools.items()}
+        named = {folder: name for name, folder in here.items()}
+        lines = [{**line, "pool": here[line["pool"]]} for line in self.lines if line["pool"] in here]
+        pools = LevelPools(self._shift(told), self.options.search, [*self.pools.values()], told.pool is None)
+        rounds = Search(told, pools, self.lost).rounds(outcomes_of(lines))
+        return {replace(which, pool=named[which.pool]) for some in rounds for which in some}
+
+    def _shift(self, told: ThresholdSettings) -> Shift:
+        return Shift.of(told.task, told.along, told.levels, self.options.search)
 
     @cached_property
     def lost(self) -> dict[str, str]:

@@ -235,7 +235,7 @@ class Comparison:
     @property
     def headlines(self) -> list[str]:
         """Sentences about the tables of the policies."""
-        return [line for result in self.results for line in result.sentences if line]
+        return [*dict.fromkeys(line for result in self.results for line in result.sentences if line)]
 
     def plain(self, folder: Path) -> Mapping[str, Any]:
         """The comparison as plain data; that of one policy alone is its result.

@@ -158,7 +158,8 @@ class Curves:
     def _ends(self) -> tuple[Floats, Floats]:
         """Lower and upper ends of all candidates: lines below the value, curves, lines above it."""
         points, last = self._candidates, self.levels + 1
-        return np.r_[-1, points - STEP / 2, last], np.r_[-1, points + STEP / 2, last]
+        low, high = np.round([points - STEP / 2, points + STEP / 2], 6)
+        return np.r_[-1, low, last], np.r_[-1, high, last]
 
     @property
     def _starts(self) -> Ints:

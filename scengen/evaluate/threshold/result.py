@@ -9,6 +9,7 @@ import numpy as np
 
 from ..comparison import PolicyResult
 from ..statistics import Rate, rate
+from ..table import percent
 from .curves import Curves, Estimates
 from .settings import ThresholdSettings
 from .shift import Shift
@@ -140,11 +141,11 @@ def rows(results: Sequence[ThresholdResult]) -> Iterator[Mapping[str, str]]:
     for level, one in enumerate(results[0].levels):
         row = {"level": str(level), results[0].shift.name: one.value}
         for result in results:
-            found = result.levels[level].rate
-            name = result.settings.name
-            row |= {f"n {name}": str(found.rollouts) if found else "0", name: _percent(found)}
+            name = f"{result.settings.name} " if len(results) > 1 else ""
+            rate_here = result.levels[level].rate
+            row |= {f"{name}n": str(rate_here.rollouts if rate_here else 0), f"{name}success": _percent(rate_here)}
         yield row
 
 
 def _percent(found: Rate | None) -> str:
-    return "-" if found is None else f"{100 * found.value:.0f} [{100 * found.low:.0f}, {100 * found.high:.0f}]"
+    return "-" if found is None else percent(found, digits=0)

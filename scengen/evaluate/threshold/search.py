@@ -120,7 +120,7 @@ def find(
             outcomes |= outcomes_of(run.lines())
             played += len(some)
             progress(played, settings.budget)
-        progress(settings.budget, settings.budget)
+        progress(played, played)
         run.sort()
         return Evaluation(run.lines(), run.earlier, lost, (), {}, run.chain)
 

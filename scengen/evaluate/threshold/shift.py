@@ -120,7 +120,7 @@ class Shift:
     def _oracle_on_axis(self) -> str:
         card, solved = (ledger.latest(kind, self.task.name).get(self.name) for kind in ("axis", "certified"))
         if card is not None and (text := self._in_levels(card.value["boundaries"]["oracle"])):
-            return f"the oracle {text} (axis card){ledger.mark(card)}"
+            return f"the oracle {text}, by the axis card{ledger.mark(card)}"
         if solved is not None and "solved" in solved.value:
             figures = f"{solved.value['solved']} of {solved.value['draws']} draws of the whole axis"
             return f"the oracle solves {figures}{ledger.mark(solved)}"
