@@ -18,10 +18,10 @@ $(READY): pyproject.toml constraints.txt
 
 demo: setup
 	$(BIN)/scengen generate task=domino_single n=6 workers=2 pool=$(DEMO)/id
-	$(BIN)/scengen generate task=domino_single split=diagonal n=6 workers=2 pool=$(DEMO)/diagonal
+	$(BIN)/scengen generate task=domino_single split=low_starter n=6 workers=2 pool=$(DEMO)/low_starter
 	$(BIN)/scengen verify pool=$(DEMO)/id workers=2
-	$(BIN)/scengen verify pool=$(DEMO)/diagonal workers=2
-	$(BIN)/scengen show pool=$(DEMO)/id,$(DEMO)/diagonal to=$(DEMO)/contact_sheet.html films=true
+	$(BIN)/scengen verify pool=$(DEMO)/low_starter workers=2
+	$(BIN)/scengen show pool=$(DEMO)/id,$(DEMO)/low_starter to=$(DEMO)/contact_sheet.html films=true
 
 # What continuous integration runs. The certified sample is two of the paper's OOD conditions; the stored behaviour has all tasks.
 # What runs on one core runs two at a time.

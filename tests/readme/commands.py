@@ -28,7 +28,7 @@ APART = {
     "scengen generate task=domino_single split=slick": "20 scenarios more: 2 minutes",
     "scengen generate task=domino_single split=id,diagonal seed=0,1": "20 scenarios more: 2 minutes",
     "scengen generate task=domino_single n=100 attack=500": "100 scenarios, and 500 rollouts: 15 minutes",
-    "scengen show pool=generated/id,generated/diagonal": "40 pictures: a minute without a graphics card",
+    "scengen show pool=generated/id,generated/low_starter": "40 pictures: a minute without a graphics card",
     "scengen show view": "needs a display",
     "scengen attack": "200 rollouts: 2 minutes",
     "scengen show film hit=": "the name is that of a hit, which differs from machine to machine",

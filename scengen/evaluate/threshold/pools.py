@@ -14,7 +14,7 @@ from ...pool import Pool
 from ...pool.manifest import MANIFEST
 from ...runs.generate import GenerateSettings, generate
 from ...work.parallel import Workers
-from ..scenarios import Scenarios, known
+from ..scenarios import known
 from ..settings import SCENARIOS
 from .shift import Shift
 

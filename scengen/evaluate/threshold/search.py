@@ -14,7 +14,6 @@ from ..settings import RolloutId
 from .curves import LOOKS_AT_LEVEL, LOOKS_PER_ROUND, Curves, Ints
 from .pools import LevelPools
 from .settings import ThresholdSettings
-from .shift import Shift
 
 DESIGN = "threshold"
 """Entry of a run with the settings that decide which rollouts are played."""
