@@ -297,7 +297,7 @@ def _help() -> str:
                 lines.append(f"  {verb:<18}{_purpose(verb)}")
             lines += [f"  {verb} {form:<{17 - len(verb)}}{_purpose(f'{verb} {form}')}" for form in FORMS.get(verb, ())]
         lines.append("")
-    lines.append("example: scengen generate task=domino_single split=low_starter n=100 workers=2 pool=generated/low_starter")
+    lines.append("example: scengen generate task=domino_single split=low_starter n=20 workers=2 pool=generated/low")
     lines.append('completion in bash: eval "$(scengen --completion bash)"')
     return "\n".join(lines)
 
