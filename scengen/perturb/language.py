@@ -39,10 +39,14 @@ class Words:
         """The words of a task, without wordings if no file has them.
 
         Raises:
-            BadConfig: the file is damaged.
+            BadConfig: the file is damaged, or has the instruction itself.
         """
         path = task_files.file_of_group(task, "language", search)
-        return cls(task, instruction, wordings(path) if path else {})
+        found = wordings(path) if path else {}
+        for name, texts in found.items():
+            if instruction in texts:
+                raise BadConfig(f"{path}: {name} has the instruction of the task itself; give other words")
+        return cls(task, instruction, found)
 
 
 @cache
