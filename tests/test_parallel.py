@@ -190,3 +190,22 @@ def test_without_what_only_linux_has_work_is_done_all_the_same(monkeypatch):
     assert sorted(each(work, ["a", "b", "c"], 2, Limits(60, 2000))) == ["a", "b", "c"]
     with machine.memory_bounded(1):
         assert len(bytes(10_000_000)) == 10_000_000
+
+
+MASKED = """
+import signal, sys
+from scengen.work.parallel import each
+
+def held_back(item):
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+if __name__ == "__main__":
+    print(*each(held_back, [1, 2], workers=2))
+"""
+
+
+def test_the_first_worker_that_is_spawned_holds_ctrl_c_back_like_the_others(tmp_path):
+    """Python starts a tracker of resources with it, and lets the signals through again while it does."""
+    (tmp_path / "masked.py").write_text(MASKED)
+    done = subprocess.run([sys.executable, tmp_path / "masked.py"], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("True True\n", "")

@@ -28,6 +28,8 @@ COMPLETING = ("--completion", "--complete")
 """Options that shells use."""
 GRACE = 1.5
 """Time that an interrupted command has to clean up before it is ended [s]."""
+AGAIN = 0.05
+"""Time after which an interruption that C has ignored comes again [s]."""
 OUT_OF_MEMORY = "out of memory; process less at once, use fewer workers, or raise the limit of memory (ulimit -v)"
 """Message for a command that has no memory left."""
 NO_MEMORY = "Could not allocate memory"
@@ -63,6 +65,7 @@ class Signals:
         """Whether the command has ended, and Python and Ray take themselves apart."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._receive)
+        sys.unraisablehook = self._ignored
 
     def _receive(self, number: int, frame: FrameType | None) -> None:
         if self._finished:
@@ -75,6 +78,16 @@ class Signals:
         timer.daemon = True
         timer.start()
         raise KeyboardInterrupt
+
+    def _ignored(self, error: "sys.UnraisableHookArgs") -> None:
+        """Interrupt again what was interrupted in a function that C has called, as the compiler does: it ends there."""
+        if not issubclass(error.exc_type, KeyboardInterrupt):
+            sys.__unraisablehook__(error)
+            return
+        self.received = False
+        again = threading.Timer(AGAIN, signal.raise_signal, [self.status - 128])
+        again.daemon = True
+        again.start()
 
     def finish(self, status: int) -> None:
         """Let a signal from now on end the process with the status of the command."""

@@ -14,7 +14,8 @@ from ..envs.gym import INFOS, Observation, PoolEnv, checked
 from ..envs.vector import PoolVectorEnv
 from ..episode import check_rules
 from ..errors import ForeignCode, ScengenError
-from ..perturb.perturbation import NONE
+from ..perturb.language import Words
+from ..perturb.perturbation import NONE, Perturbation
 from ..pool import Pool
 from ..pool.files import sha256
 from ..pool.library import Library
@@ -152,6 +153,7 @@ class PolicyPlayer:
         who, observed = told.values()
         for task in sorted(tasks):
             envs, policies = self._prepared_for(task, NONE)
+            _check_conditions(envs.envs[0], self.settings, self.search)
             who[task], names = self._identity(policies[0]), envs.envs[0].observed
             observed[task] = [*names.streams, *names.cameras]
         return told
@@ -187,6 +189,18 @@ class PolicyPlayer:
                     with policy_errors(self.settings.name, "its close"):
                         close()
             self._running = None
+
+
+def _check_conditions(env: PoolEnv, settings: EvaluateSettings, search: Sequence[str]) -> None:
+    """Raise `ScengenError` if a condition cannot be played on a task: before any is, which may take hours."""
+    row, seen = env._rows[0], env.observed
+    for perturbation in map(Perturbation.parse, settings.perturbations):
+        perturbation.check([*seen.streams], [*seen.cameras.values()], env.look)
+        if perturbation.has_words:
+            words = Words.of(row.task, row.instruction, search)
+            perturbation.of(row.id, settings.perturb_seed, words=words).instruction  # noqa: B018  (it raises an error)
+    for arm in settings.chosen_arms or ():
+        instruction(arm, row, search)
 
 
 def folders_of(settings: EvaluateSettings, task: str) -> list[str]:

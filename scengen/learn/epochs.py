@@ -11,6 +11,8 @@ network in jax 0.7.1 (compiled, one core, in turn) 0.65 to 0.9 s. This saves too
 import math
 import time
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,8 @@ BATCH = 256
 """Rows per step of the optimiser."""
 FIRST_RATE = 1e-3
 """Learning rate of Adam in the first epoch. It falls to 0 along half a cosine."""
+INTERRUPTED = "Training interrupted by user"
+"""Beginning of the warning of scikit-learn about Ctrl-C."""
 DECAY = 1e-4
 """Weight of the squared norm of the weights."""
 
@@ -132,8 +136,9 @@ class Training:
             "random_state": int(2**31 * unit("epoch", self._seed, member, number)),
         }
         network = MLPRegressor(**options)
-        with threadpool_limits(1), warnings.catch_warnings():
+        with threadpool_limits(1), _interruptions(), warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)  # one pass is what was requested
+            warnings.filterwarnings("error", INTERRUPTED, UserWarning)
             if self.arrays:
                 network.partial_fit(inputs[:BATCH], chunks[:BATCH])  # makes the arrays that are replaced now
                 network.coefs_ = [self.arrays[f"weights{i}"][member].copy() for i in range(len(self.hidden) + 1)]
@@ -141,6 +146,17 @@ class Training:
             network.fit(inputs, chunks)
         weights = {f"weights{i}": values for i, values in enumerate(network.coefs_)}
         return weights | {f"biases{i}": values for i, values in enumerate(network.intercepts_)}
+
+
+@contextmanager
+def _interruptions() -> Iterator[None]:
+    """Interrupt a training again: scikit-learn turns Ctrl-C into a warning, and calls half an epoch a whole one."""
+    try:
+        yield
+    except UserWarning as error:
+        if INTERRUPTED not in str(error):
+            raise
+        raise KeyboardInterrupt from None
 
 
 def _augmented(

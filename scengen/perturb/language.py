@@ -44,10 +44,14 @@ class Words:
         """The words of a task, without wordings or free bodies if no file has them.
 
         Raises:
-            BadConfig: the file is damaged.
+            BadConfig: the file is damaged, or has the instruction itself.
         """
         path, things = (task_files.file_of_group(task, group, search) for group in ("language", "things"))
-        return cls(task, instruction, wordings(path) if path else {}, free_bodies(things) if things else ())
+        found = wordings(path) if path else {}
+        for name, texts in found.items():
+            if instruction in texts:
+                raise BadConfig(f"{path}: {name} has the instruction of the task itself; give other words")
+        return cls(task, instruction, found, free_bodies(things) if things else ())
 
     def lacks(self, kind: str) -> str:
         """What the task lacks for a kind, and the remedy; empty if nothing."""

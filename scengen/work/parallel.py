@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, NoReturn, Protocol, TypeVar, runtime_checkable
 
@@ -253,6 +254,8 @@ class _Worker:
         with theirs:
             arguments = (theirs, self._function, self._limits, os.getpid())
             process = self._context.Process(target=_serve, args=arguments, daemon=True)
+            if self._context.get_start_method() == "spawn":
+                resource_tracker.ensure_running()  # its own start would let the signals through again
             # Ctrl-C and SIGTERM may reach the whole process group before the worker has set its handlers.
             with machine.interrupts_blocked():
                 try:

@@ -93,7 +93,7 @@ def is_pointer(file: BufferedReader) -> bool:
 
 
 class _Plain(yaml.SafeLoader):
-    """A loader that refuses aliases, by which a small file can stand for any amount of data.
+    """A loader that refuses keys that stand twice, and aliases, by which a small file can stand for any amount of data.
 
     The faster loader in C does not call `compose_node`.
     """
@@ -102,6 +102,12 @@ class _Plain(yaml.SafeLoader):
         if self.check_event(yaml.AliasEvent):
             raise yaml.YAMLError("it has an alias; write the value out")
         return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        found = super().construct_mapping(node, deep)
+        if len(found) < len(node.value):
+            raise yaml.YAMLError("it has a key twice; give each key once")
+        return found
 
 
 def read_yaml(setting: str, path: Path) -> dict[str, Any]:

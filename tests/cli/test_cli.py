@@ -399,3 +399,22 @@ def test_a_shortcut_that_never_rests_gets_a_remedy(monkeypatch, capsys, tmp_path
     monkeypatch.setattr(command, "generate", rejected)
     assert cli.run(["generate", "task=domino_single", "n=1", f"pool={tmp_path / 'p'}"]) == 0
     assert "leave to_rest out" in capsys.readouterr().out.replace("\n", " ")
+
+
+INSIDE_C = """
+import ctypes, signal, time
+from scengen.cli.program import Signals
+signals = Signals()
+signals.working = True
+try:
+    ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGTERM))()
+    time.sleep(5)
+except KeyboardInterrupt:
+    print("ended in order", signals.status)
+"""
+
+
+def test_an_interruption_in_a_function_that_c_has_called_is_not_lost():
+    """C ignores errors, and Python would print a traceback: a compiler that was interrupted would go on."""
+    done = subprocess.run([sys.executable, "-c", INSIDE_C], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("ended in order 143\n", "")

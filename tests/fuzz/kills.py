@@ -168,7 +168,8 @@ def hit(kind: Kind, folder: Path, way: str, after: float, workers: int, more: Se
         time.sleep(0.1)
     if left := group(process.pid):
         return f"processes stay: {left}"
-    lines = [line for line in told.splitlines() if line.startswith("scengen") and "a Ray cluster" not in line]
+    hints = ("a Ray cluster", "was not curated")
+    lines = [each for each in told.splitlines() if each.startswith("scengen") and not any(h in each for h in hints)]
     if "Traceback" in told or len(lines) > 1 or "damaged" in told:
         return f"said {told[-600:]!r}"
     if way != "SIGKILL" and set(folder.parent.rglob("*.part")) - before:

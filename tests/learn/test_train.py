@@ -68,6 +68,28 @@ def test_an_interrupted_training_ends_with_the_same_weights(tmp_path, kind):
     )
 
 
+def test_an_epoch_that_is_interrupted_inside_scikit_learn_is_not_kept(tmp_path, monkeypatch):
+    """It ends the pass, warns, and returns what it has: half an epoch that a continued training would build on."""
+    from sklearn.neural_network import _multilayer_perceptron as perceptrons
+
+    batches = perceptrons.gen_batches
+
+    def interrupt(done, total, told):
+        if done == 3:
+            monkeypatch.setattr(perceptrons, "gen_batches", cut)
+
+    def cut(*arguments, **options):
+        yield next(iter(batches(*arguments, **options)))
+        raise KeyboardInterrupt
+
+    trained(tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        trained(tmp_path / "cut", interrupt)
+    monkeypatch.setattr(perceptrons, "gen_batches", batches)
+    assert trained(tmp_path / "cut").earlier == 3
+    assert weights(tmp_path / "cut") == weights(tmp_path / "whole")
+
+
 def test_a_finished_training_is_not_repeated_and_never_replaced(tmp_path):
     trained(tmp_path)
     assert trained(tmp_path).losses == ()

@@ -32,7 +32,9 @@ POOLS = "pools"
 
 def command(arguments: Arguments) -> int:
     if changed := task_overrides(arguments):
-        raise BadConfig(f"{cut(changed[0])}; a search is about tasks as they are: leave it out, or generate pools with it")
+        raise BadConfig(
+            f"{cut(changed[0])}; a search is about tasks as they are: leave it out, or generate pools with it"
+        )
     settings, search = read(VERB, arguments, ThresholdSettings), search_path(arguments)
     settings = replace(settings, task=chosen_task(VERB, arguments) or "")
     every = settings.several()
@@ -109,7 +111,9 @@ def _report(result: ThresholdResult, pools: LevelPools) -> bool:
         warn(f"UNKNOWN {called[scenario]}: {why}; it is left out")
     crashed = sum(bool(episode["crashed"]) for episode in found.episodes)
     if crashed:
-        remark(f"{result.settings.name} crashed in {crashed} of {len(found.episodes)} episodes, which count for nothing")
+        remark(
+            f"{result.settings.name} crashed in {crashed} of {len(found.episodes)} episodes, which count for nothing"
+        )
     if found.earlier:
         say(f"{found.earlier} of {len(found.episodes)} episodes are from an earlier run; fresh=true repeats them")
     return bool(found.lost or crashed)
