@@ -65,7 +65,8 @@ def command(arguments: Arguments) -> int:
         for path, content in plots(results, settings.folder).items():
             write(path, content)
     say(f"wrote {settings.folder}: table.md, table.json, episodes.jsonl, episodes.csv")
-    return FAILED if any([_report(result, pools) for result in results]) else OK
+    failed = [_report(result, pools) for result in results]
+    return FAILED if any(failed) else OK
 
 
 def _pools(settings: ThresholdSettings, shift: Shift, search: Sequence[str]) -> LevelPools:
