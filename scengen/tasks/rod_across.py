@@ -30,6 +30,7 @@ from ..assets.ridge import Ridge
 from ..assets.rod import SLUG_EDGE, Rod
 from ..decisions import Decision, around, choice, near, side_of
 from ..errors import GaveUp
+from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, gap, shortest, way_to
 from ..means import Mean, once
 from ..params import param
@@ -91,9 +92,15 @@ class RodAcross(RodAndRidge[Rod]):
     # --- oracle ---------------------------------------------------------------------------
 
     def oracle(self, world: World) -> Plan:
-        """Grasp the rod in the middle, measure its centre of mass, lay it down with that over the ridge."""
+        """Grasp the rod in the middle, measure its centre of mass, lay it down with that over the ridge.
+
+        Raises:
+            GaveUp: the hand feels no weight.
+        """
         yield from self.lift(world)
         weight, torque = yield from self.feel(world)
+        if weight <= 0.0:
+            raise GaveUp("the hand holds no weight")
         yield from self.lay(world, self.held_at(world) + torque / weight)
 
     def lift(self, world: World) -> Plan:
