@@ -30,7 +30,6 @@ from ..assets.ridge import Ridge
 from ..assets.rod import SLUG_EDGE, Rod
 from ..decisions import Decision, around, choice, near, side_of
 from ..errors import GaveUp
-from ..errors import GaveUp
 from ..geometry import UP, Vec3, about_z, gap, shortest, way_to
 from ..means import Mean, once
 from ..params import param
