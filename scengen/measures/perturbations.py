@@ -54,7 +54,7 @@ class Proofs(Measurement):
             played = run(scenario, world_of(scenario, task.embodiment), scenario.oracle, task.horizon)
             made = scenario, rebuild(scenario), task.embodiment, played.actions, words, secrets
             with closing(Stage(*made)) as stage:
-                for kind in (k for k in perceived().values() if not words.lacks(k.name)):
+                for kind in (k for k in perceived().values() if not k.lacks(words)):
                     for level in range(1, LEVELS + 1):
                         cells.setdefault((kind.name, level), []).append(stage.proof(kind, level))
         faults = {

@@ -76,6 +76,8 @@ class Proof:
     """Names of what is shifted or hidden that the text has."""
     is_crossed: bool = False
     """Whether the witness comes close to a distractor."""
+    touched: tuple[str, ...] = ()
+    """Bodies that look different although a text, a rule or a goal may name their look."""
 
     def faults(self) -> Iterator[str]:
         """What is not proved."""
@@ -92,6 +94,8 @@ class Proof:
             yield f"the text names {name}"
         if self.is_crossed:
             yield "a distractor is in the way"
+        for body in self.touched:
+            yield f"{body} looks different"
 
 
 def faults_of_draws(kind: Kind) -> Iterator[str]:
@@ -168,7 +172,8 @@ class Stage:
                     hidden |= self._lost(self.shown[number], self._counts(self._uncovered(drawn, ids)))
             if level == LEVELS and changed:
                 neutral = neutral and self._played()[1] == self.digest
-            return Proof(neutral, changes, tuple(sorted(hidden)), is_crossed=self._is_crossed())
+            touched = self._touched(changed) if kind.effect.on_things is not None else ()
+            return Proof(neutral, changes, tuple(sorted(hidden)), is_crossed=self._is_crossed(), touched=touched)
 
     def _shown(self, kind: Kind) -> list[Mapping[str, Where]]:
         """Pixels over which a kind is judged, by camera, for each moment: all; of a kind that changes things those that
@@ -182,6 +187,13 @@ class Stage:
     def _is_spare(self, name: str, rows: NDArray[np.int64]) -> bool:
         """Whether only spare geoms differ in an array."""
         return name in PLACES and set(rows.tolist()) <= {*spares(self.world.model)}
+
+    def _touched(self, changed: Mapping[str, NDArray[np.int64]]) -> tuple[str, ...]:
+        """Bodies with a geom whose colour or material differs, apart from those whose look carries no meaning."""
+        model = self.world.model
+        rows = {row for name in ("geom_rgba", "geom_matid") for row in changed.get(name, np.zeros(0, int)).tolist()}
+        others = rows - {*free_geoms(model, self.words.free)}
+        return tuple(sorted({model.body(model.geom_bodyid[geom]).name for geom in others}))
 
     def _is_crossed(self) -> bool:
         """Whether the witness comes close to a distractor."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..assets.prop import TABLE_HALF, TABLE_TOP
 from ..look.looks import Look
 from ..sim.world import scene_geoms
-from .things import add_print
+from .things import add_prints
 
 SPARE = "spare_"
 """Beginning of the names of the spare geoms."""
@@ -36,11 +36,11 @@ TRIES = 400
 
 
 def with_spares(look: Look) -> Look:
-    """A look whose scenes have spare geoms, and a spare material."""
+    """A look whose scenes have spare geoms, and spare materials."""
 
     def change(spec: mujoco.MjSpec) -> None:
         look.change(spec)
-        add_print(spec)
+        add_prints(spec)
         for number in range(SPARES):
             spare = spec.worldbody.add_geom(name=f"{SPARE}{number}", group=1, contype=0, conaffinity=0, mass=0)
             spare.size, spare.pos = np.full(3, HALF[0]), np.array([0.0, 0.0, -1.0])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..control.loop import Loop
 from ..errors import BadConfig
 from ..samplers.keyed import unit
-from .effects import EFFECTS, OBJECTS, Effect, Picture, Reading, Values, number_in
+from .effects import OBJECTS, Effect, Picture, Reading, Values, number_in
 from .kinds import affects, kinds, stream_kind
 from .language import WORDINGS, Words
 
@@ -71,11 +71,11 @@ class Drawn:
         Raises:
             BadConfig: the task names no body whose look carries no meaning, for a part that changes such bodies.
         """
-        for name in (n for n in EFFECTS if n in self.values):  # things before the table, whose colour they avoid
+        for name in sorted(self.values, key=lambda name: self.effects[name].on_things is None):  # before the table
             effect, values = self.effects[name], self.values[name]
             if effect.on_things is not None:
                 assert self.words is not None, "who draws for things gives the words of their task"
-                if lacks := self.words.lacks(name):
+                if lacks := kinds()[name].lacks(self.words):
                     raise BadConfig(f"{name}: {lacks}")
                 effect.on_things(model, values, self.words.free)
             effect.on_model(model, values)

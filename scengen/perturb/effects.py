@@ -84,7 +84,7 @@ class Effect:
     looks: Collection[str] = tuple(LOOKS)
     """Names of the looks that show it."""
     is_added: bool = False
-    """Whether it shows spare geoms or a spare material, with which the scene must be compiled
+    """Whether it shows spare geoms or materials, with which the scene must be compiled
     (`scengen.perturb.distractors.with_spares`)."""
     is_late: bool = False
     """Whether pictures arrive `seconds` late."""

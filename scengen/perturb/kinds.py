@@ -1,13 +1,21 @@
-"""The kinds of perturbation, from `conf/perturbations`, and what each of them affects."""
+"""The kinds of perturbation, from `conf/perturbations`, and what each of them affects.
 
+A file of an installed package, `perturbations/<kind>.yaml` in a folder of its entry points `scengen.tasks`, adds a
+kind: strengths for an effect that there is, or for one that a function returns (`effect: module:function`).
+"""
+
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
-from ..errors import BadConfig, UnknownName
-from ..samplers.task_files import conf_dir
+from ..errors import BadConfig, ScengenError, UnknownName, cut
+from ..samplers.task_files import conf_dir, packages
+from ..work.foreign import at_fault, factory_of, is_factory
 from ..work.plain import read_yaml
-from .effects import CONTROL, EFFECTS, OBJECTS, PICTURES, PROPRIOCEPTION, WRENCH, Effect, is_among
+from .effects import CONTROL, EFFECTS, LANGUAGE, OBJECTS, PICTURES, PROPRIOCEPTION, WRENCH, Effect, is_among
+from .language import NO_WORDINGS, WORDINGS, Words
 
 LEVELS = 5
 """Number of levels of each kind."""
@@ -26,10 +34,25 @@ class Kind:
     """Reason for the range."""
     source: str
     """Ranges that others use."""
+    own: Effect | None = None
+    """Effect of a kind that a package adds; None for those of scengen, which are in `EFFECTS`."""
 
     @property
     def effect(self) -> Effect:
-        return EFFECTS[self.name]
+        return self.own or EFFECTS[self.name]
+
+    def lacks(self, words: Words) -> str:
+        """What a task lacks for it, with the remedy; empty if nothing.
+
+        Args:
+            words: what is said in the task.
+        """
+        if self.name in WORDINGS and not words.wordings:
+            return NO_WORDINGS.format(words.task)
+        if self.effect.on_things is not None and not words.free:
+            file = f"conf/things/{words.task}.yaml"
+            return f"{words.task} names no body whose look carries no meaning; if there is one, list it in {file}"
+        return ""
 
 
 @cache
@@ -39,20 +62,61 @@ def kinds() -> Mapping[str, Kind]:
     Raises:
         BadConfig: a file is damaged, has not as many growing strengths as there are levels, or no effect.
     """
-    found = {}
+    found = dict[str, Kind]()
     for path in sorted((conf_dir() / "perturbations").glob("*.yaml")):
-        node, name = read_yaml("kind", path), path.stem
-        if name not in EFFECTS:
-            raise BadConfig(f"{path}: there is no effect named {name}; give it in scengen.perturb.effects")
-        try:
-            strengths = tuple(float(each) for each in node["strengths"])
-            kind = Kind(name, strengths, *(str(node[key]) for key in ("unit", "why", "source")))
-        except (KeyError, TypeError, ValueError) as error:
-            raise BadConfig(f"{path}: give strengths, unit, why and source ({error})") from None
-        if len(strengths) != LEVELS or any(b <= a for a, b in zip((0.0, *strengths), strengths, strict=False)):
-            raise BadConfig(f"{path}: strengths = {list(strengths)}; give {LEVELS} growing positive numbers")
-        found[name] = kind
+        if path.stem not in EFFECTS:
+            raise BadConfig(f"{path}: there is no effect named {path.stem}; give it in scengen.perturb.effects")
+        found[path.stem] = _kind(path)
+    for folder in packages():
+        for path in sorted(Path(folder.removeprefix("file://"), "perturbations").glob("*.yaml")):
+            if path.stem in found or not re.fullmatch("[a-z][a-z0-9_]*", path.stem):
+                raise BadConfig(f"{path}: give a kind a name that no other has, in small letters, such as my_noise")
+            found[path.stem] = _kind(path, is_added=True)
     return found
+
+
+def _kind(path: Path, is_added: bool = False) -> Kind:
+    """The kind in a file.
+
+    Args:
+        is_added: whether a package adds it, with an effect that the file names.
+    """
+    node = read_yaml("kind", path)
+    needed = ("strengths", "unit", "why", "source", *(("effect",) if is_added else ()))
+    try:
+        strengths = tuple(float(each) for each in node["strengths"])
+        texts = [str(node[key]) for key in needed[1:]]
+    except (KeyError, TypeError, ValueError) as error:
+        raise BadConfig(f"{path}: give {', '.join(needed)} ({error})") from None
+    if len(strengths) != LEVELS or any(b <= a for a, b in zip((0.0, *strengths), strengths, strict=False)):
+        raise BadConfig(f"{path}: strengths = {list(strengths)}; give {LEVELS} growing positive numbers")
+    return Kind(path.stem, strengths, *texts[:3], own=_own_effect(path, texts[3]) if is_added else None)
+
+
+def _own_effect(path: Path, name: str) -> Effect:
+    """The effect that a file of a package names.
+
+    Raises:
+        ScengenError: there is none of this name, or the function fails or returns something else.
+    """
+    if is_factory(name):
+        setting = f"{path}: effect"
+        factory = factory_of(setting, name)
+        try:
+            made = factory()
+        except ScengenError:
+            raise
+        except Exception as error:
+            raise at_fault(setting, name, "its function fails", error) from error
+        if not isinstance(made, Effect):
+            raise BadConfig(f"{setting} = {cut(name)}; it returned {type(made).__name__}, and must return an Effect")
+        return made
+    known = [
+        each for each, effect in EFFECTS.items() if effect.reads not in (CONTROL, LANGUAGE) and not effect.on_things
+    ]
+    if name not in known:
+        raise UnknownName(f"effect for {path}", name, [*known, "module:function"])
+    return EFFECTS[name]
 
 
 def perceived() -> Mapping[str, Kind]:

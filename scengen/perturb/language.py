@@ -19,8 +19,8 @@ WORDINGS = ("reworded", "terse", "vague", "foreign")
 """Kinds that replace the instruction by a text of `conf/language/<task>.yaml`."""
 CLAUSES = ("verbose", "distracting")
 """Kinds that add sentences of `conf/language/clauses.yaml`."""
-THINGS = ("thing_colour", "thing_texture")
-"""Kinds that change the look of bodies of `conf/things/<task>.yaml`."""
+NO_WORDINGS = f"{{0}} has no other wordings; write {', '.join(WORDINGS)} to conf/language/{{0}}.yaml"
+"""Why a wording of a task cannot be given, with the task's name to be filled in."""
 TEXTS = 5
 """Number of texts of each wording."""
 MAX_TEXT = 400
@@ -52,17 +52,6 @@ class Words:
             if instruction in texts:
                 raise BadConfig(f"{path}: {name} has the instruction of the task itself; give other words")
         return cls(task, instruction, found, free_bodies(things) if things else ())
-
-    def lacks(self, kind: str) -> str:
-        """What the task lacks for a kind, and the remedy; empty if nothing."""
-        if kind in WORDINGS and not self.wordings:
-            return f"{self.task} has no other wordings; write {', '.join(WORDINGS)} to conf/language/{self.task}.yaml"
-        if kind in THINGS and not self.free:
-            return (
-                f"{self.task} names no body whose look carries no meaning; if there is one, list it in "
-                f"conf/things/{self.task}.yaml"
-            )
-        return ""
 
 
 @cache
@@ -119,8 +108,8 @@ def worded(kind: str, number: int, words: Words) -> str:
     Raises:
         BadConfig: the task has none.
     """
-    if lacks := words.lacks(kind):
-        raise BadConfig(f"{kind}: {lacks}")
+    if not words.wordings:
+        raise BadConfig(f"{kind}: {NO_WORDINGS.format(words.task)}")
     return words.wordings[kind][number - 1]
 
 

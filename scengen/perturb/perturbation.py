@@ -37,7 +37,7 @@ class Perturbation:
 
         Raises:
             UnknownName: there is no such kind.
-            BadConfig: a level does not exist, or two parts are one kind.
+            BadConfig: a level does not exist, or two parts are one kind, or change the same.
         """
         parts = list[tuple[str, int]]()
         for one in (text or "").split("+") if text not in (None, "", NONE) else ():
@@ -48,8 +48,11 @@ class Perturbation:
             if name in dict(parts):
                 raise BadConfig(f"perturb = {text}; {name} is in it twice: give each kind once")
             parts.append((name, int(level)))
-        if len(texts := [name for name, _ in parts if name in WORDINGS]) > 1:
-            raise BadConfig(f"perturb = {text}; {' and '.join(texts)} replace the same instruction: give one of them")
+        texts = [name for name, _ in parts if name in WORDINGS]
+        prints = [name for name, _ in parts if kinds()[name].effect.on_things is not None]
+        for both, what in ((texts, "replace the same instruction"), (prints, "change the look of the same things")):
+            if len(both) > 1:
+                raise BadConfig(f"perturb = {text}; {' and '.join(both)} {what}: give one of them")
         return cls(tuple(parts))
 
     def __str__(self) -> str:
@@ -90,7 +93,7 @@ class Perturbation:
     def check_words(self, words: Words) -> None:
         """Raise `BadConfig` if a task lacks what a part needs: other wordings, or things that no text names."""
         for name, level in self.parts:
-            if lacks := words.lacks(name):
+            if lacks := kinds()[name].lacks(words):
                 raise BadConfig(f"perturb = {name}@{level}: {lacks}")
 
     def dressed(self, look: Look) -> Look:

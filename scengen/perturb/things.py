@@ -4,7 +4,7 @@
 table as people need to tell them apart, and take no hue that another thing has, which a text may name.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from fnmatch import fnmatchcase
 
 import mujoco
@@ -22,29 +22,33 @@ FAR = 45.0
 """Distance in CIELAB from the present colour from which on another one is taken at once."""
 TRIES = 100
 """Number of colours that are tried."""
-SHARES = np.linspace(0.0, 1.0, 11)[1:, None]
+SHARES = np.linspace(0.0, 1.0, 41)[1:, None]
 """Shares of another colour at which it must be clear of others, shape (n, 1)."""
 HIDDEN_GROUP = 3
 """Lowest group of geoms that pictures do not show."""
-PRINT = "spare_print"
-"""Name of a spare material and its texture, with which scenes are compiled."""
+PRINT = "spare_print_"
+"""Beginning of the names of spare materials and their textures, with which scenes are compiled."""
+PRINTS = 8
+"""Number of spare materials: one for each colour of things."""
 EDGE = 64
 """Edge of each face of the texture [pixels]."""
 FACES = 6
-"""Number of faces: the texture is a cube, so that it covers meshes as well."""
+"""Number of faces: textures are cubes, which cover meshes as well."""
 
 Colour = tuple[float, ...]
 Path = NDArray[np.float64]
 """Colours in CIELAB at `SHARES`, shape (n, 3)."""
 
 
-def add_print(spec: mujoco.MjSpec) -> None:
-    """Add the spare material to a scene."""
-    texture = spec.add_texture(name=PRINT, type=mujoco.mjtTexture.mjTEXTURE_CUBE, width=EDGE, height=EDGE)
-    texture.builtin, texture.rgb1 = mujoco.mjtBuiltin.mjBUILTIN_FLAT, np.ones(3)
-    made = spec.add_material(name=PRINT)
-    made.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = PRINT
-    made.specular, made.shininess = 0.1, 0.2
+def add_prints(spec: mujoco.MjSpec) -> None:
+    """Add the spare materials to a scene."""
+    for number in range(PRINTS):
+        name = f"{PRINT}{number}"
+        texture = spec.add_texture(name=name, type=mujoco.mjtTexture.mjTEXTURE_CUBE, width=EDGE, height=EDGE)
+        texture.builtin, texture.rgb1 = mujoco.mjtBuiltin.mjBUILTIN_FLAT, np.ones(3)
+        made = spec.add_material(name=name)
+        made.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+        made.specular, made.shininess = 0.1, 0.2
 
 
 def paint(model: mujoco.MjModel, share: float, key: int, bodies: Collection[str]) -> None:
@@ -55,31 +59,36 @@ def paint(model: mujoco.MjModel, share: float, key: int, bodies: Collection[str]
         key: seed of the other colours.
         bodies: patterns of the names of the bodies.
     """
-    rng, clear = np.random.default_rng(key), _Clear(model, bodies)
-    for rgb, geoms in sorted(clear.things.items()):
-        other = clear.chosen(rng, [rgb], lambda one, target: _mixed(np.array(one), target, SHARES))
-        model.geom_rgba[geoms, :3] = _mixed(np.array(rgb), other, np.array(share))
+    for rgb, geoms, other in _others(model, key, bodies):
+        model.geom_rgba[geoms, :3] = _mixed(rgb, other, np.array(share))
 
 
 def print_on(
     model: mujoco.MjModel, share: float, key: int, shade: NDArray[np.float64], bodies: Collection[str]
 ) -> None:
-    """Print a pattern on things, which multiplies their colours.
+    """Print a pattern of their colours and of others on things. Things of more colours than `PRINTS` stay.
 
     Args:
-        share: share of the tint of the pattern.
-        key: seed of the tint.
-        shade: 0 where the pattern has the tint and 1 where it is white, shape (`EDGE`, `EDGE`).
+        share: share of the other colours.
+        key: seed of the other colours.
+        shade: 0 where the pattern has another colour and 1 elsewhere, shape (`EDGE`, `EDGE`).
         bodies: patterns of the names of the bodies.
     """
-    rng, clear, white = np.random.default_rng(key), _Clear(model, bodies), np.ones(3)
-    tint = clear.chosen(rng, [*clear.things], lambda rgb, target: _mixed(white, target, SHARES) * rgb, white)
-    colours = shade[..., None] + (1.0 - shade[..., None]) * _mixed(white, tint, np.array(share))
-    material = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL, PRINT)
-    texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB])
-    start, size = model.tex_adr[texture], FACES * EDGE * EDGE * 3
-    model.tex_data[start : start + size] = np.tile((255.0 * colours).round().astype(np.uint8).ravel(), FACES)
-    model.geom_matid[[geom for geoms in clear.things.values() for geom in geoms]] = material
+    for number, (rgb, geoms, other) in enumerate(_others(model, key, bodies)[:PRINTS]):
+        colours = shade[..., None] * rgb + (1.0 - shade[..., None]) * _mixed(rgb, other, np.array(share))
+        material = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL, f"{PRINT}{number}")
+        start = model.tex_adr[model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB]]
+        face = (255.0 * colours).round().astype(np.uint8).ravel()
+        model.tex_data[start : start + FACES * face.size] = np.tile(face, FACES)
+        model.geom_matid[geoms], model.geom_rgba[geoms, :3] = material, 1.0
+
+
+def _others(
+    model: mujoco.MjModel, key: int, bodies: Collection[str]
+) -> list[tuple[NDArray[np.float64], list[int], NDArray[np.float64]]]:
+    """Present colour, geoms and another colour of all things whose look carries no meaning."""
+    rng, clear = np.random.default_rng(key), _Clear(model, bodies)
+    return [(np.array(rgb), geoms, clear.chosen(rng, rgb)) for rgb, geoms in sorted(clear.things.items())]
 
 
 def _mixed(rgb: NDArray[np.float64], other: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -97,38 +106,26 @@ class _Clear:
             self.things.setdefault(_colour(model, geom), []).append(geom)
         others = {_colour(model, geom) for geom in [*({*_shown(model)} - {*free}), model.geom("table_top").id]}
         self._others = [lab(colour) for colour in sorted(others)]
-        self._taken: list[tuple[NDArray[np.float64], Path]] = []
-        """Colours of things that have another one, before and at `SHARES`."""
+        self._ways: dict[Colour, Path] = {rgb: lab(rgb)[None] for rgb in self.things}
+        """Colours of these things at `SHARES`; the present ones of those for which nothing is chosen yet."""
 
-    def chosen(
-        self,
-        rng: np.random.Generator,
-        colours: Collection[Colour],
-        ways: Callable[[Colour, NDArray[np.float64]], NDArray[np.float64]],
-        kept: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]:
-        """Another colour for things, shape (3,): the first clear one that is `FAR`, or the farthest clear one.
-
-        Args:
-            colours: present colours of the things.
-            ways: function of a present colour and another one, which returns the colours at `SHARES`.
-            kept: what is chosen if none is clear; by default the present colour.
-        """
-        best, farthest = np.array(next(iter(colours))) if kept is None else kept, 0.0
-        before = [lab(colour) for colour in colours]
+    def chosen(self, rng: np.random.Generator, rgb: Colour) -> NDArray[np.float64]:
+        """Another colour for things, shape (3,): the first clear one that is `FAR`, or the farthest clear one, or the
+        present one if none is clear."""
+        best, farthest, before = np.array(rgb), 0.0, lab(rgb)
         for target in rng.uniform(0.05, 0.95, (TRIES, 3)):
-            paths = [lab(ways(colour, target)) for colour in colours]
-            far = min(float(np.linalg.norm(p[-1] - b)) for p, b in zip(paths, before, strict=True))
-            if far > farthest and all(self._is_clear(*each) for each in zip(before, paths, strict=True)):
+            far = float(np.linalg.norm(lab(target) - before))
+            if far > farthest and self._is_clear(rgb, lab(_mixed(np.array(rgb), target, SHARES))):
                 best, farthest = target, far
                 if far >= FAR:
                     break
-        self._taken += zip(before, (lab(ways(colour, best)) for colour in colours), strict=True)
+        self._ways[rgb] = lab(_mixed(np.array(rgb), best, SHARES))
         return best
 
-    def _is_clear(self, before: NDArray[np.float64], path: Path) -> bool:
+    def _is_clear(self, rgb: Colour, path: Path) -> bool:
         """Whether a thing stays apart from all others on a path from its present colour."""
-        for other, way in [*((each, each[None]) for each in self._others), *self._taken]:
+        before, ways = lab(rgb), [(lab(each), way) for each, way in self._ways.items() if each != rgb]
+        for other, way in [*((each, each[None]) for each in self._others), *ways]:
             away, was = np.linalg.norm(path - way, axis=1).min(), np.linalg.norm(before - other)
             if away < min(APART, was) - 1e-9:
                 return False

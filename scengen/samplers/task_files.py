@@ -19,7 +19,9 @@ from ..errors import BadConfig, UnknownName, cut
 
 PACKAGES = "scengen.tasks"
 """Group of entry points with which an installed package offers tasks: `any_name = "my_package.conf"` names a folder in
-it that holds `task/<task>.yaml`."""
+it that holds `task/<task>.yaml` or kinds of perturbation."""
+OFFERED = ("task", "perturbations")
+"""Folders of which a package offers one at least."""
 ID = "id"
 """Name of the training split."""
 EMBODIMENT = "panda_jaw"
@@ -67,7 +69,7 @@ def _offered(point: EntryPoint) -> str:
         found = None
     folders = (found and found.submodule_search_locations) or ()
     for folder in folders:
-        if Path(folder, "task").is_dir():
+        if any(Path(folder, group).is_dir() for group in OFFERED):
             return folder
     whose = point.dist.name if point.dist else point.name
     raise BadConfig(

@@ -27,12 +27,6 @@ SIZE = 256
 """Width and height of the picture [pixels]: those that environments have by default."""
 FIRST_LEVEL = 3
 """Level at which the slider starts."""
-CHOICES = (
-    OFF,
-    CLEAN,
-    *(n for n, k in kinds().items() if k.effect.reads in (PICTURES, LANGUAGE) and not k.effect.is_late),
-)
-"""Choices: the kinds of perturbation that a single picture or the instruction shows, and two more."""
 
 
 class Seen:
@@ -51,7 +45,7 @@ class Seen:
         """Scenario and choices of the present picture."""
         gui = client.gui
         with gui.add_folder("what a policy sees"):
-            self.kind: viser.GuiDropdownHandle[str] = gui.add_dropdown("perturbation", CHOICES)
+            self.kind: viser.GuiDropdownHandle[str] = gui.add_dropdown("perturbation", choices())
             self.level: viser.GuiSliderHandle[int] = gui.add_slider("level", 1, LEVELS, 1, FIRST_LEVEL, disabled=True)
             self.camera: viser.GuiDropdownHandle[str] = gui.add_dropdown("camera", [*cameras_of(JAW)])
             self.image = gui.add_image(np.zeros((12, 12, 3), np.uint8), format="jpeg", visible=False)
@@ -106,6 +100,12 @@ class Seen:
             self._start = Start(row, scenario, ROOM, SIZE)
         self.image.image = self._start.picture(eye, drawn)
         return drawn.instruction or ("clean" if kind == CLEAN else _strength(kind_of(kind), level))
+
+
+def choices() -> tuple[str, ...]:
+    """Choices: the kinds of perturbation that a single picture or the instruction shows, and two more."""
+    effects = ((name, kind.effect) for name, kind in kinds().items())
+    return OFF, CLEAN, *(n for n, e in effects if e.reads in (PICTURES, LANGUAGE) and not e.is_late)
 
 
 def _strength(kind: Kind, level: int) -> str:

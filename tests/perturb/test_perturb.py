@@ -180,7 +180,15 @@ def stage(row):
 
 @drawing
 @pytest.mark.parametrize(
-    ("name", "level"), [("light_direction", 2), ("camera_angle", 2), ("noise", 3), ("object_noise", 1)]
+    ("name", "level"),
+    [
+        ("thing_colour", 1),
+        ("thing_texture", 5),
+        ("light_direction", 2),
+        ("camera_angle", 2),
+        ("noise", 3),
+        ("object_noise", 1),
+    ],
 )
 def test_sound_kinds_are_proved(stage, name, level):
     assert list(stage.proof(kinds()[name], level).faults()) == []
@@ -227,7 +235,19 @@ def put_in_the_way(model, values):
     model.geom_pos[visible(model)[0]] = model.body("tile_0").pos
 
 
+def paint_the_slab(model, values, bodies):
+    EFFECTS["thing_colour"].on_things(model, values, bodies)
+    model.geom_rgba[model.body("slab").geomadr[0], :3] = [0.9, 0.45, 0.1]
+
+
 FAULTS = {
+    "red that turned orange": ("thing_colour", {"on_things": paint_the_slab}, "slab looks different"),
+    "things that stay as they are": ("thing_colour", {"on_things": lambda model, values, bodies: None}, "changes by 0"),
+    "a print that is not uploaded": (
+        "thing_texture",
+        {"on_things": lambda model, values, bodies: None},
+        "changes by 0",
+    ),
     "a dead light": ("light_direction", {"on_model": lambda model, values: None}, "changes by 0"),
     "the wrist left out": ("camera_fov", {"on_model": spare_wrist(EFFECTS["camera_fov"].on_model)}, "rgb_gripper_cam"),
     "a picture that is not changed": ("noise", {"on_picture": lambda picture, values, rng: picture}, "changes by 0"),

@@ -64,7 +64,7 @@ def command(arguments: Arguments) -> int:
         if not shows(kind, camera, look):
             raise BadConfig(f"perturb = {kind.name}; a single picture does not show it")
     scenario = task_of(pool, search_path(arguments)).scenario(row.params)
-    wanted = [kind for kind in wanted if not words.lacks(kind.name)]
+    wanted = [kind for kind in wanted if not kind.lacks(words)]
     drawn = [kind for kind in wanted if shows(kind, camera, look)]
     if drawn:
         with ProgressBar(err, "sheet", 1) as bar:
