@@ -79,7 +79,7 @@ class StoredRun:
 
 @dataclass(frozen=True)
 class StoredResult:
-    """The entries of a policy in `table.json` that are no figures. The others are computed again from the lines."""
+    """The entries of a policy in `table.json` that are not figures. The others are computed again from the lines."""
 
     folder: str
     """Folder of the episodes, from that of the table."""
@@ -102,7 +102,7 @@ class StoredResult:
         found = typed(str(path), cls, {f.name: plain[f.name] for f in fields(cls) if f.name in plain})
         if found.folder != "." and found.folder not in {each.name for each in path.parent.iterdir()}:
             raise BadConfig(
-                f"{path} is about episodes in {cut(found.folder)!a}, which is no folder beside it; "
+                f"{path} is about episodes in {cut(found.folder)!a}, which is not a folder beside it; "
                 "give a folder that scengen evaluate wrote"
             )
         return found

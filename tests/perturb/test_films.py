@@ -71,7 +71,7 @@ def test_a_perturbed_film_is_turned_as_pictures_for_policies_are(row, monkeypatc
         (["perturb=wrist_camera@1"], "affects wrist cameras, and none is observed"),
         (["perturb=wrench_noise@1"], "affects streams of wrench, and none is observed"),
         (["perturb=table_texture@1", "look=plain"], "shows in look=room, not in plain"),
-        (["perturb=payload@1"], "payload@1 changes how the arm obeys, and a film replays what an arm has done"),
+        (["perturb=payload@1"], "payload changes what happens: a film replays what an arm has done"),
         (["perturb=blurr@1"], "did you mean 'blur'?"),
         (["perturb=blur@1", "perturb_seed=-1"], "perturb_seed = -1; it must be at least 0"),
     ],

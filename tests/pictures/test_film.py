@@ -12,6 +12,7 @@ from PIL import Image
 from scengen import cli, list_tasks, load_task
 from scengen.assets.box import Cube, Domino
 from scengen.assets.prop import TABLE_TOP, place, table
+from scengen.control.loop import Loop
 from scengen.envs.observations import CAMERAS
 from scengen.look.looks import PLAIN
 from scengen.means import MISSED, SHOWN
@@ -275,7 +276,7 @@ class Window:
         self.cam, self.opt = mujoco.MjvCamera(), mujoco.MjvOption()
 
     def open(self, model, data, **_):
-        self.world = World(model, data, None)
+        self.world = World(model, data, Loop(model, data))
         return self
 
     def is_running(self):

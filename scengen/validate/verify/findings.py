@@ -190,7 +190,13 @@ class Findings:
 
 def task_differences(installed: Task, stored: Task) -> list[dict[str, str]]:
     """Differences between the installed task and one that a manifest describes, except for scans."""
-    return list(differences(installed.node, {key: value for key, value in stored.node.items() if key != "scans"}))
+    return list(differences(_meaning(installed.node), _meaning(stored.node)))
+
+
+def _meaning(node: Mapping[str, Any]) -> dict[str, Any]:
+    """A task file without scans, and without the reasons and sources of axes, on which no scenario depends."""
+    axes = {name: {**axis, "why": "", "source": ""} for name, axis in (node.get("axes") or {}).items()}
+    return {**{key: value for key, value in node.items() if key != "scans"}, **({"axes": axes} if axes else {})}
 
 
 def wrong_names(installed: Task, stored: Task) -> Iterator[str]:
