@@ -208,7 +208,7 @@ def _row(plain: Any, path: Path) -> Evidence:
         raise ValueError(f"version = {row.version}, n = {row.n}")
     for name in _FIGURES.get(row.kind, ()):
         figure = row.value.get(name)
-        if type(figure) not in (int, float) or figure < 0:
+        if not isinstance(figure, (int, float)) or isinstance(figure, bool) or figure < 0:
             raise ValueError(f"value has {name} = {cut(repr(figure))}")
     return replace(row, value=_Entries(row.value), made_with=_Entries(row.made_with))
 
