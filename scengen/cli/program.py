@@ -85,7 +85,7 @@ class Signals:
             sys.__unraisablehook__(error)
             return
         self.received = False
-        again = threading.Timer(AGAIN, signal.raise_signal, [self.status - 128])
+        again = threading.Timer(AGAIN, signal.pthread_kill, [threading.main_thread().ident, self.status - 128])
         again.daemon = True
         again.start()
 

@@ -1,6 +1,7 @@
 """Perturbations are drawn by key, change what is perceived and nothing else, and faults in them are found."""
 
 import copy
+import json
 from contextlib import closing
 from dataclasses import replace
 
@@ -14,6 +15,8 @@ from scengen.compose import load_task
 from scengen.envs.gym import PoolEnv
 from scengen.envs.vector import PoolVectorEnv
 from scengen.errors import BadConfig, UnknownName
+from scengen.evaluate.rollouts import evaluate
+from scengen.evaluate.settings import EvaluateSettings
 from scengen.measures.measurement import Job
 from scengen.measures.perturbations import Proofs
 from scengen.measures.proofs import Stage, faults_of_draws
@@ -344,3 +347,44 @@ def test_a_sheet_shows_each_level_beside_the_clean_picture(tmp_path, capsys):
     assert "affects wrist cameras" in capsys.readouterr().err
     assert cli.run([*words, "perturb=foreign"]) == 0 and "foreign@1: Kipp den ersten" in capsys.readouterr().out
     assert cli.run([*words, "perturb=late"]) == 2 and "a single picture does not" in capsys.readouterr().err
+
+
+# --- what a person gives ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("perturb", ["shadow@3", "wrist_camera@1"])
+def test_a_condition_that_cannot_be_played_is_found_before_the_clean_episodes(tmp_path, monkeypatch, perturb):
+    """Its name comes after `none`, so that hours of clean episodes would be played first."""
+    monkeypatch.setattr("scengen.evaluate.rollouts._played", lambda *_: pytest.fail("it has begun"))
+    settings = EvaluateSettings(policy="random", pool=str(REFERENCE), to=str(tmp_path), perturb=perturb)
+    with pytest.raises(BadConfig, match="and none is observed"):
+        evaluate(settings, lambda *_: None)
+
+
+@pytest.mark.parametrize("condition", [{"perturb": "terse@2"}, {"arms": ["reworded"]}])
+def test_words_that_a_task_lacks_are_found_before_the_clean_episodes(tmp_path, monkeypatch, condition):
+    monkeypatch.setattr("scengen.evaluate.rollouts._played", lambda *_: pytest.fail("it has begun"))
+    monkeypatch.setattr("scengen.samplers.task_files.file_of_group", lambda *_: None)
+    monkeypatch.setattr(EvaluateSettings, "_gets_text", True)
+    settings = EvaluateSettings(policy="random", pool=str(REFERENCE), to=str(tmp_path), **condition)
+    with pytest.raises(BadConfig, match="domino_single has no other wordings; write "):
+        evaluate(settings, lambda *_: None)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("reworded: [a, b, c, d, e]\n", "it has a key twice; give each key once"),
+        ("", "terse has the instruction of the task itself; give other words"),
+    ],
+)
+def test_words_that_change_nothing_or_stand_twice_are_refused(tmp_path, monkeypatch, text, says):
+    path = tmp_path / "push.yaml"
+    groups = {kind: [f"{kind} {k}" for k in range(5)] for kind in ("reworded", "vague", "foreign")}
+    groups["terse"] = ["Push it.", "a", "b", "c", "d"]
+    path.write_text("".join(f"{kind}: {json.dumps(texts)}\n" for kind, texts in groups.items()) + text)
+    monkeypatch.setattr("scengen.samplers.task_files.file_of_group", lambda *_: path)
+    with pytest.raises(BadConfig, match=says):
+        Words.of("push", "Push it.")
+    if not text:
+        assert Words.of("push", "Pull it.").wordings["terse"][0] == "Push it."
