@@ -62,7 +62,7 @@ class StoredRun:
         return typed(str(path), cls, plain)
 
     def contradictions(self, told: EvaluateSettings) -> Iterator[str]:
-        """Settings that differ from those of the table.
+        """Settings that are not those of the table.
 
         Args:
             told: settings of the table.
@@ -102,8 +102,8 @@ class StoredResult:
         found = typed(str(path), cls, {f.name: plain[f.name] for f in fields(cls) if f.name in plain})
         if found.folder != "." and found.folder not in {each.name for each in path.parent.iterdir()}:
             raise BadConfig(
-                f"{path} is about episodes in {cut(found.folder)!a}, which is not a folder beside it; "
-                "give a folder that scengen evaluate wrote"
+                f"{path} names the folder {cut(found.folder)!a}, and there is none of that name beside it; "
+                "give a folder of scengen evaluate"
             )
         return found
 

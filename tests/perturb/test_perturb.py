@@ -383,7 +383,9 @@ def test_words_that_change_nothing_or_stand_twice_are_refused(tmp_path, monkeypa
     groups = {kind: [f"{kind} {k}" for k in range(5)] for kind in ("reworded", "vague", "foreign")}
     groups["terse"] = ["Push it.", "a", "b", "c", "d"]
     path.write_text("".join(f"{kind}: {json.dumps(texts)}\n" for kind, texts in groups.items()) + text)
-    monkeypatch.setattr("scengen.samplers.task_files.file_of_group", lambda *_: path)
+    monkeypatch.setattr(
+        "scengen.samplers.task_files.file_of_group", lambda _, group, *__: path if group == "language" else None
+    )
     with pytest.raises(BadConfig, match=says):
         Words.of("push", "Push it.")
     if not text:
