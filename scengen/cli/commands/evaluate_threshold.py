@@ -15,10 +15,11 @@ from ...evaluate.rollouts import Evaluation
 from ...evaluate.settings import PROFILE, other_version
 from ...evaluate.threshold.pools import DrawnPools, LevelPools, given
 from ...evaluate.threshold.result import ThresholdResult, rows
-from ...evaluate.threshold.search import find, with_levels
+from ...evaluate.threshold.search import check, find, with_levels
 from ...evaluate.threshold.settings import ThresholdSettings
 from ...evaluate.threshold.shift import Shift
 from ...pool import Pool
+from ...pool.collection import write_index
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
 from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write
@@ -32,7 +33,9 @@ POOLS = "pools"
 
 def command(arguments: Arguments) -> int:
     if changed := task_overrides(arguments):
-        raise BadConfig(f"{cut(changed[0])}; a search is about tasks as they are: leave it out, or generate pools with it")
+        raise BadConfig(
+            f"{cut(changed[0])}; a search is about tasks as they are: leave it out, or generate pools with it"
+        )
     settings, search = read(VERB, arguments, ThresholdSettings), search_path(arguments)
     settings = replace(settings, task=chosen_task(VERB, arguments) or "")
     every = settings.several()
@@ -40,6 +43,8 @@ def command(arguments: Arguments) -> int:
         one.check()
         find_policy(one.name, client=one.remote)
     shift = Shift.of(settings.task, settings.along, settings.levels, search)
+    for one in every:
+        check(one, shift)
     pools, found = _pools(settings, shift, search), list[Evaluation]()
     for one in every:
         if difference := other_version(one, search):
@@ -47,6 +52,8 @@ def command(arguments: Arguments) -> int:
         with ProgressBar(err, f"threshold {one.name}", 1, one.workers) as progress_bar:
             found.append(_found(one, pools, progress_bar.of, search))
     drawn = {str(pool.folder): pool.sha256 for pool in pools.pools} if pools.is_drawn else {}
+    if pools.is_drawn:
+        write_index(settings.folder / POOLS, pools.pools)
     results = [
         ThresholdResult(one, replace(evaluation, drawn=drawn), shift)
         for one, evaluation in zip(every, found, strict=True)
@@ -62,8 +69,9 @@ def command(arguments: Arguments) -> int:
 
         for path, content in plots(results, settings.folder).items():
             write(path, content)
+    incomplete = [_report(result, pools) for result in results]
     say(f"wrote {settings.folder}: table.md, table.json, episodes.jsonl, episodes.csv")
-    return FAILED if any([_report(result, pools) for result in results]) else OK
+    return FAILED if any(incomplete) else OK
 
 
 def _pools(settings: ThresholdSettings, shift: Shift, search: Sequence[str]) -> LevelPools:
@@ -75,8 +83,7 @@ def _pools(settings: ThresholdSettings, shift: Shift, search: Sequence[str]) -> 
         def progress(split: str, done: int, total: int) -> None:
             progress_bar.of(done, total, f"certify {split}")
 
-        folder, numbers = settings.folder / POOLS, (settings.seed, settings.budget)
-        return DrawnPools(shift, search, [], True, folder, *numbers, settings.workers, progress)
+        return DrawnPools(shift, search, [], True, settings.folder / POOLS, settings.seed, settings.workers, progress)
 
 
 def _found(
@@ -109,7 +116,9 @@ def _report(result: ThresholdResult, pools: LevelPools) -> bool:
         warn(f"UNKNOWN {called[scenario]}: {why}; it is left out")
     crashed = sum(bool(episode["crashed"]) for episode in found.episodes)
     if crashed:
-        remark(f"{result.settings.name} crashed in {crashed} of {len(found.episodes)} episodes, which count for nothing")
+        remark(
+            f"{result.settings.name} crashed in {crashed} of {len(found.episodes)} episodes, which count for nothing"
+        )
     if found.earlier:
         say(f"{found.earlier} of {len(found.episodes)} episodes are from an earlier run; fresh=true repeats them")
     return bool(found.lost or crashed)

@@ -10,7 +10,7 @@ import numpy as np
 from ..comparison import PolicyResult
 from ..statistics import Rate, rate
 from ..table import percent
-from .curves import Curves, Estimates
+from .curves import LOOKS_PER_ROUND, Curves, Estimates
 from .settings import ThresholdSettings
 from .shift import Shift
 
@@ -84,7 +84,7 @@ class ThresholdResult(PolicyResult):
     @property
     def sentences(self) -> Iterator[str]:
         """Sentences about the breaking point, a rise, the oracle, and the means."""
-        for told in (self.breaking, self.rising, self.by_means):
+        for told in (self.breaking, self.rising, self.by_means, self.exhausted):
             if told:
                 yield f"{self.settings.name}: {told}"
         yield self.shift.oracle
@@ -104,7 +104,9 @@ class ThresholdResult(PolicyResult):
         elif self.low is None:
             told = f"breaks before level {self.high:.1f} of {shift.name}, perhaps without a shift (success {share})"
         elif self.high is None:
-            told = f"breaks beyond level {first} of {shift.name}, perhaps not at all up to level {last} (success {share})"
+            told = (
+                f"breaks beyond level {first} of {shift.name}, perhaps not at all up to level {last} (success {share})"
+            )
         else:
             at = "" if self.point is None else f"level {self.point:.1f}"
             value = f", {text}" if self.point is not None and (text := shift.value(self.point)) else ""
@@ -120,6 +122,13 @@ class ThresholdResult(PolicyResult):
         one, other = (f"{sum(self._outcomes[level])} of {len(self._outcomes[level])}" for level in (low, high))
         what = "the interval is that of the first fall" if low else "success without a shift is lower than beyond"
         return f"not monotone: {one} succeed at level {low}, {other} at level {high}; {what}"
+
+    @property
+    def exhausted(self) -> str:
+        """Whether the pools have ended the search; empty if they have not."""
+        left = self.chosen.budget - len(self.evaluation.episodes)
+        decided = self.estimate.is_decided(self.chosen.precision, self.shift.levels)[0]
+        return "" if decided or left < LOOKS_PER_ROUND else "the pools hold too few scenarios for a narrower interval"
 
     @property
     def plain(self) -> dict[str, Any]:

@@ -35,7 +35,9 @@ class ThresholdSettings(EvaluateSettings):
     @property
     def folder(self) -> Path:
         """Folder of the results; for several policies, that of their comparison."""
-        return Path(self.to) if self.to else Path("generated/threshold", f"{self.task}-{self.along}", super().folder.name)
+        return (
+            Path(self.to) if self.to else Path("generated/threshold", f"{self.task}-{self.along}", super().folder.name)
+        )
 
     @property
     def design(self) -> Mapping[str, Any]:
