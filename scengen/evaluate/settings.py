@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import Self, TypeVar
 
 from ..compose import load_task
 from ..control.teleop import check_filter
@@ -113,7 +113,7 @@ class EvaluateSettings:
         names = [self.policy] if isinstance(self.policy, str) else self.policy
         return Path(self.to or Path("generated/evaluation", "+".join(map(_folder_name, names))[:MAX_FOLDER_NAME]))
 
-    def several(self) -> "list[EvaluateSettings]":
+    def several(self) -> list[Self]:
         """The settings for each policy alone.
 
         A policy that decides something itself, such as its rate, does not get that setting.
@@ -129,7 +129,7 @@ class EvaluateSettings:
             )
         return [self._alone(name) for name in self.policy]
 
-    def _alone(self, name: str) -> "EvaluateSettings":
+    def _alone(self, name: str) -> Self:
         to = self.to and str(Path(self.to, _folder_name(name)))
         remote, own_rate = is_address(name), is_address(name) or name in FULL_RATE_POLICIES
         return replace(

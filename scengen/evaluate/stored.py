@@ -61,18 +61,18 @@ class StoredRun:
             raise BadConfig(f"{path} has format {cut(repr(given), 20)}; this version reads {FORMAT}")
         return typed(str(path), cls, plain)
 
-    def contradictions(self, told: EvaluateSettings) -> Iterator[str]:
+    def contradictions(self, table: EvaluateSettings) -> Iterator[str]:
         """Settings that are not those of the table.
 
         Args:
-            told: settings of the table.
+            table: settings of the table.
         """
         own = OWN if self.policy not in (*BUILT_IN, REPLAY) else {}
-        for name in sorted({f.name for f in fields(self)} & {*vars(told)} - {"client", "format"}):
-            there, here = getattr(told, name), getattr(self, name)
+        for name in sorted({f.name for f in fields(self)} & {*vars(table)} - {"client", "format"}):
+            there, here = getattr(table, name), getattr(self, name)
             if there != here and not (name in own and there == own[name]):
                 yield f"{TABLE} says {name} = {there!r:.60}, {RUN} has {here!r:.60}"
-        design = dict(told.design) if isinstance(told, ThresholdSettings) else {}
+        design = dict(table.design) if isinstance(table, ThresholdSettings) else {}
         if design != self.threshold:
             yield f"{TABLE} is of the search {design!r:.120}, {RUN} of {dict(self.threshold)!r:.120}"
 
@@ -102,7 +102,7 @@ class StoredResult:
         found = typed(str(path), cls, {f.name: plain[f.name] for f in fields(cls) if f.name in plain})
         if found.folder != "." and found.folder not in {each.name for each in path.parent.iterdir()}:
             raise BadConfig(
-                f"{path} names the folder {cut(found.folder)!a}, and there is none of that name beside it; "
+                f"{path} needs the folder {cut(found.folder)!a} beside it, and it is missing; "
                 "give a folder of scengen evaluate"
             )
         return found

@@ -15,10 +15,11 @@ from ...evaluate.rollouts import Evaluation
 from ...evaluate.settings import PROFILE, other_version
 from ...evaluate.threshold.pools import DrawnPools, LevelPools, given
 from ...evaluate.threshold.result import ThresholdResult, rows
-from ...evaluate.threshold.search import find, with_levels
+from ...evaluate.threshold.search import check, find, with_levels
 from ...evaluate.threshold.settings import ThresholdSettings
 from ...evaluate.threshold.shift import Shift
 from ...pool import Pool
+from ...pool.collection import write_index
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
 from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write
@@ -42,6 +43,8 @@ def command(arguments: Arguments) -> int:
         one.check()
         find_policy(one.name, client=one.remote)
     shift = Shift.of(settings.task, settings.along, settings.levels, search)
+    for one in every:
+        check(one, shift)
     pools, found = _pools(settings, shift, search), list[Evaluation]()
     for one in every:
         if difference := other_version(one, search):
@@ -49,6 +52,8 @@ def command(arguments: Arguments) -> int:
         with ProgressBar(err, f"threshold {one.name}", 1, one.workers) as progress_bar:
             found.append(_found(one, pools, progress_bar.of, search))
     drawn = {str(pool.folder): pool.sha256 for pool in pools.pools} if pools.is_drawn else {}
+    if pools.is_drawn:
+        write_index(settings.folder / POOLS, pools.pools)
     results = [
         ThresholdResult(one, replace(evaluation, drawn=drawn), shift)
         for one, evaluation in zip(every, found, strict=True)
@@ -64,9 +69,9 @@ def command(arguments: Arguments) -> int:
 
         for path, content in plots(results, settings.folder).items():
             write(path, content)
+    incomplete = [_report(result, pools) for result in results]
     say(f"wrote {settings.folder}: table.md, table.json, episodes.jsonl, episodes.csv")
-    failed = [_report(result, pools) for result in results]
-    return FAILED if any(failed) else OK
+    return FAILED if any(incomplete) else OK
 
 
 def _pools(settings: ThresholdSettings, shift: Shift, search: Sequence[str]) -> LevelPools:
@@ -78,8 +83,7 @@ def _pools(settings: ThresholdSettings, shift: Shift, search: Sequence[str]) -> 
         def progress(split: str, done: int, total: int) -> None:
             progress_bar.of(done, total, f"certify {split}")
 
-        folder, numbers = settings.folder / POOLS, (settings.seed, settings.budget)
-        return DrawnPools(shift, search, [], True, folder, *numbers, settings.workers, progress)
+        return DrawnPools(shift, search, [], True, settings.folder / POOLS, settings.seed, settings.workers, progress)
 
 
 def _found(

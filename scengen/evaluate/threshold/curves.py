@@ -1,7 +1,7 @@
 """The level at which a chance of success falls to a given value, estimated from single looks at whole levels.
 
-Level 0 is without a shift, 1 to n are the levels of an axis or a perturbation. The breaking point is a number of
-levels: 2.4 lies between levels 2 and 3. A look is one rollout at a level, each of another scenario.
+Level 0 is no shift, 1 to n are the levels of an axis or a perturbation. The breaking point is a number of levels: 2.4
+lies between levels 2 and 3. A look is one rollout at a level, each of another scenario.
 
 A chance is taken to fall along a logistic curve between two plateaus, one above the value and one below it. The
 likelihood of a breaking point is its mean over slopes and plateaus of a grid. Two more candidates never cross the
@@ -74,13 +74,17 @@ class Estimates:
         """Whether the chance rises again."""
         return self.rise > RISE
 
-    def is_narrow(self, width: float) -> Bools:
-        """Whether the interval is narrow enough, and no rise is suspected.
+    def is_decided(self, width: float, levels: int) -> Bools:
+        """Whether the interval is narrow, lies on one side of no shift and of the last level, and no rise is suspected.
 
         Args:
             width: largest width [levels].
+            levels: number of levels.
         """
-        return (self.high - self.low <= width + STEP / 2) & (self.returns | (self.rise < SUSPECTED_RISE))
+        narrow = self.high - self.low <= width + STEP / 2
+        for end in (0, levels):
+            narrow &= (self.low >= end) | (self.high <= end)
+        return narrow & (self.returns | (self.rise < SUSPECTED_RISE))
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,7 @@ class Curves:
         counts = self._counting(risen, rise)
         likelihood = self._likelihood(tried * counts, solved * counts)
         ratio = 2 * np.log(np.maximum(likelihood, 1e-300) / likelihood.max(axis=1, keepdims=True))
-        share = np.minimum(1.0, tried.sum(axis=1, keepdims=True) / FULL_SEARCH)
+        share = np.clip(tried.sum(axis=1, keepdims=True) / FULL_SEARCH, 1 / FULL_SEARCH, 1.0)
         held = ratio >= -MARGIN / share
         first, last = held.argmax(axis=1), held.shape[1] - 1 - held[:, ::-1].argmax(axis=1)
         within = np.cumsum(likelihood * held, axis=1)
@@ -145,9 +149,16 @@ class Curves:
 
     def _weights(self, tried: Ints, solved: Ints) -> Floats:
         """Likelihood of each curve as a share of that of all, shape (searches, curves)."""
-        found = solved @ np.log(self._chances).T + (tried - solved) @ np.log(1 - self._chances).T
+        success, failure = self._logarithms
+        found = solved @ success + (tried - solved) @ failure
         found = np.exp(found - found.max(axis=1, keepdims=True))
         return found / found.sum(axis=1, keepdims=True)
+
+    @cached_property
+    def _logarithms(self) -> tuple[Floats, Floats]:
+        """Logarithms of the chances of a success and of a failure, shape (levels + 1, curves) each."""
+        chances = np.ascontiguousarray(self._chances.T)
+        return np.log(chances), np.log(1 - chances)
 
     @cached_property
     def _candidates(self) -> Floats:

@@ -1,7 +1,7 @@
 """Pools of the levels of a shift: given ones, or fresh scenarios that are certified when they are needed.
 
 Fresh pools never grow: when the scenarios of a level are used up, another pool is drawn from another seed. Scenarios of
-different levels are not twins, so that the outcomes of all looks are independent.
+different levels are no twins, so that the outcomes of all looks are independent.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,12 +21,26 @@ from .shift import Shift
 LEVEL = "quick"
 """Level of the certificates."""
 BLOCK = 6
-"""Number of scenarios of a pool of an axis: the first looks at a level, and as many again."""
+"""Number of scenarios of a pool of an axis: the first looks at a level, and as many again. A training pool has as many
+as in the paper: the policy `replay` remembers them."""
 SEEDS_OF_LEVEL = 1000
 """Distance between the seeds of two levels: larger than the number of pools of a level."""
 
-Candidate = tuple[str, str, int, int]
-"""Folder of the pool of a scenario, its id, and seed and index of its draw, which it shares with its twins."""
+
+@dataclass(frozen=True, order=True)
+class Candidate:
+    """A scenario of a level. The order does not depend on where the pools are."""
+
+    seed: int
+    """Seed of its draw."""
+    index: int
+    """Index of its draw; twins have the same seed and index."""
+    id: str
+    """Id of the scenario."""
+    pool_sha256: str
+    """Hash of its pool."""
+    folder: str
+    """Folder of its pool."""
 
 
 @dataclass
@@ -50,16 +64,11 @@ class LevelPools:
             self._read(pool)
 
     def candidates(self, level: int) -> Sequence[Candidate]:
-        """The scenarios of a level, in the order in which they are used."""
+        """The scenarios of a level, in the order of their draws, in which they are used."""
         return self._of_level[level if self.shift.is_axis else 0]
 
-    def is_endless(self, level: int) -> bool:
-        """Whether a search can get any number of scenarios of a level. There is one training pool, since the policy
-        `replay` remembers it."""
-        return self.is_drawn and self.shift.is_axis and level > 0
-
     def draw(self, level: int) -> None:
-        """Draw further scenarios of a level that is endless; those of a finished search are there already."""
+        """Draw further scenarios of a level. Those of a finished search are there already."""
 
     def _read(self, pool: Pool) -> None:
         """Note the scenarios of a pool that belong to a level."""
@@ -69,7 +78,9 @@ class LevelPools:
             if told["task"] == self.shift.task.name and level is not None:
                 self.shift.check_values(level, told["shifted"], folder)
                 self.about[folder, id_] = dict(told)
-                self._of_level[level].append((folder, id_, told["seed"], told["index"]))
+                self._of_level[level].append(Candidate(told["seed"], told["index"], id_, pool.sha256, folder))
+        for candidates in self._of_level.values():
+            candidates.sort()
 
 
 def given(shift: Shift, folders: Sequence[str], search: Sequence[str]) -> LevelPools:
@@ -98,8 +109,6 @@ class DrawnPools(LevelPools):
     """Folder of the pools."""
     seed: int = 0
     """Seed of the first pool."""
-    budget: int = 0
-    """Largest number of rollouts of a search."""
     workers: Workers = 1
     """Number of processes."""
     progress: Callable[[str, int, int], None] = lambda split, done, total: None
@@ -117,10 +126,10 @@ class DrawnPools(LevelPools):
         Raises:
             PoolError: too few scenarios could be certified.
         """
-        split, number = self.shift.split(level), self._counts[level]
+        level = level if self.shift.is_axis else 0
+        split, number, count = self.shift.split(level), self._counts[level], BLOCK if level else SCENARIOS
         self._counts[level] += 1
-        count = BLOCK if level else SCENARIOS if self.shift.is_axis else self.budget
-        folder = self.folder / (f"{split}-{number}" if level else split)
+        folder = self.folder / (f"{split}-{number}" if number else split)
         if not (folder / MANIFEST).is_file() or len(Pool.open(folder)) < count:
             seed = self.seed + SEEDS_OF_LEVEL * level + number
             asked = GenerateSettings(split=split, n=count, seed=seed, workers=self.workers, pool=str(folder))

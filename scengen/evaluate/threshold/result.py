@@ -10,7 +10,7 @@ import numpy as np
 from ..comparison import PolicyResult
 from ..statistics import Rate, rate
 from ..table import percent
-from .curves import Curves, Estimates
+from .curves import LOOKS_PER_ROUND, Curves, Estimates
 from .settings import ThresholdSettings
 from .shift import Shift
 
@@ -20,7 +20,7 @@ class Level:
     """Rollouts at a level in which the policy did not crash."""
 
     level: int
-    """Number of the level; 0 is without a shift."""
+    """Number of the level; 0 is no shift."""
     value: str
     """Values of the shift."""
     rate: Rate | None
@@ -84,7 +84,7 @@ class ThresholdResult(PolicyResult):
     @property
     def sentences(self) -> Iterator[str]:
         """Sentences about the breaking point, a rise, the oracle, and the means."""
-        for told in (self.breaking, self.rising, self.by_means):
+        for told in (self.breaking, self.rising, self.by_means, self.exhausted):
             if told:
                 yield f"{self.settings.name}: {told}"
         yield self.shift.oracle
@@ -122,6 +122,13 @@ class ThresholdResult(PolicyResult):
         one, other = (f"{sum(self._outcomes[level])} of {len(self._outcomes[level])}" for level in (low, high))
         what = "the interval is that of the first fall" if low else "success without a shift is lower than beyond"
         return f"not monotone: {one} succeed at level {low}, {other} at level {high}; {what}"
+
+    @property
+    def exhausted(self) -> str:
+        """Whether the pools have ended the search; empty if they have not."""
+        left = self.chosen.budget - len(self.evaluation.episodes)
+        decided = self.estimate.is_decided(self.chosen.precision, self.shift.levels)[0]
+        return "" if decided or left < LOOKS_PER_ROUND else "the pools hold too few scenarios for a narrower interval"
 
     @property
     def plain(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The search for the level at which a policy breaks: rounds of rollouts, each at the levels that inform most."""
+"""The search for the level at which a policy breaks: rounds of rollouts, each at the levels that tell most."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -9,11 +9,12 @@ import numpy as np
 from ...errors import BadConfig
 from ..arms import CLEAN
 from ..rollouts import Evaluation, Keep, id_of, identity, opened, ready
-from ..scenarios import not_playable
-from ..settings import RolloutId
+from ..scenarios import Scenarios, not_playable
+from ..settings import RolloutId, completed
 from .curves import LOOKS_AT_LEVEL, LOOKS_PER_ROUND, Curves, Ints
-from .pools import LevelPools
+from .pools import Candidate, LevelPools
 from .settings import ThresholdSettings
+from .shift import Shift
 
 DESIGN = "threshold"
 """Entry of a run with the settings that decide which rollouts are played."""
@@ -29,17 +30,10 @@ class Search:
         """
         Args:
             lost: scenarios that cannot be played, with the reasons.
-
-        Raises:
-            BadConfig: the budget does not suffice for the first looks.
         """
-        self.settings, self.pools, self.lost = settings, pools, lost or {}
-        self.shift, levels = pools.shift, pools.shift.levels
-        self.curves = Curves(levels, settings.success)
+        self.settings, self.pools, self.lost, self.shift = settings, pools, lost or {}, pools.shift
+        self.curves = Curves(self.shift.levels, settings.success)
         self._used: set[tuple[int, int]] = set()
-        if settings.budget < (first := LOOKS_AT_LEVEL * (levels + 1)):
-            what = f"the first looks at {levels} levels and without a shift are {first} rollouts"
-            raise BadConfig(f"budget = {settings.budget}; {what}: pass budget={first} or more")
 
     def rounds(self, outcomes: Outcomes) -> Iterator[list[RolloutId]]:
         """Yield the rollouts of each round. The outcomes must hold them before the next round; it ends if they do not.
@@ -48,6 +42,7 @@ class Search:
             outcomes: outcomes of rollouts, which grow between rounds.
         """
         counts = np.zeros((2, 1, self.shift.levels + 1), np.int64)
+        tried, solved = counts
         spent, wanted = 0, [level for level in range(self.shift.levels + 1) for _ in range(LOOKS_AT_LEVEL)]
         while wanted:
             found = [(level, which) for level in wanted if (which := self._next(level))]
@@ -56,15 +51,15 @@ class Search:
                 if which not in outcomes:
                     return
                 if (success := outcomes[which]) is not None:
-                    counts[:, 0, level] += 1, success
+                    tried[0, level] += 1
+                    solved[0, level] += success
             spent += len(wanted)
-            wanted = self._wanted(*counts, spent)
+            wanted = self._wanted(tried, solved, spent)
 
     def _wanted(self, tried: Ints, solved: Ints, spent: int) -> list[int]:
         """Levels of the next round; none if the search ends."""
-        if spent + LOOKS_PER_ROUND > self.settings.budget or (
-            tried.any() and self.curves.estimates(tried, solved).is_narrow(self.settings.precision).all()
-        ):
+        found = self.curves.estimates(tried, solved).is_decided(self.settings.precision, self.shift.levels)
+        if found.all() or spent + LOOKS_PER_ROUND > self.settings.budget:
             return []
         there = np.array([[self._has_more(level) for level in range(self.shift.levels + 1)]])
         level = int(self.curves.next_level(tried, solved, there)[0])
@@ -73,21 +68,20 @@ class Search:
     def _has_more(self, level: int) -> bool:
         """Whether a round at a level is possible."""
         unused = sum(map(self._is_unused, self.pools.candidates(level)))
-        return unused >= LOOKS_PER_ROUND or self.pools.is_endless(level)
+        return unused >= LOOKS_PER_ROUND or self.pools.is_drawn
 
     def _next(self, level: int) -> RolloutId | None:
         """The next rollout at a level, which is then used; None if there is none."""
-        if self.pools.is_endless(level) and not any(map(self._is_unused, self.pools.candidates(level))):
+        if self.pools.is_drawn and not any(map(self._is_unused, self.pools.candidates(level))):
             self.pools.draw(level)
         for candidate in filter(self._is_unused, self.pools.candidates(level)):
-            folder, id_, *twins = candidate
-            self._used.add((twins[0], twins[1]))
-            return RolloutId(self.shift.task.name, self.shift.perturbation(level), CLEAN, folder, id_, 0)
+            self._used.add((candidate.seed, candidate.index))
+            perturbation = self.shift.perturbation(level)
+            return RolloutId(self.shift.task.name, perturbation, CLEAN, candidate.folder, candidate.id, 0)
         return None
 
-    def _is_unused(self, candidate: tuple[str, str, int, int]) -> bool:
-        _, id_, *twins = candidate
-        return (twins[0], twins[1]) not in self._used and id_ not in self.lost
+    def _is_unused(self, candidate: Candidate) -> bool:
+        return (candidate.seed, candidate.index) not in self._used and candidate.id not in self.lost
 
 
 def find(
@@ -109,7 +103,7 @@ def find(
     """
     settings = ready(with_levels(settings, pools))
     fixed = [] if pools.is_drawn else pools.pools
-    lost = not_playable(fixed, pools.about, settings.workers) if fixed else {}
+    lost = not_playable(fixed, _within_reach(settings, pools), settings.workers) if fixed else {}
     depends = {**identity(settings, fixed), DESIGN: dict(settings.design)}
     with opened(settings, depends, pools.about, search, keep, lambda done, total: None) as run:
         outcomes, played = dict[RolloutId, bool | None](), 0
@@ -124,10 +118,31 @@ def find(
         return Evaluation(run.lines(), run.earlier, lost, (), {}, run.chain)
 
 
+def _within_reach(settings: ThresholdSettings, pools: LevelPools) -> Scenarios:
+    """The scenarios that a search may come to."""
+    first = (pools.candidates(level)[: settings.budget] for level in range(pools.shift.levels + 1))
+    return {(each.folder, each.id): pools.about[each.folder, each.id] for some in first for each in some}
+
+
+def check(settings: ThresholdSettings, shift: Shift) -> None:
+    """Raise `BadConfig` if a policy perceives nothing of a shift, or if the budget is below the first looks."""
+    along_levels(settings, shift).check()
+    robot = shift.task.embodiment
+    observed = settings.remote.streams(robot) if settings.remote else completed(settings).observations
+    shift.check_observed(observed, settings.look)
+    if settings.budget < (first := LOOKS_AT_LEVEL * (shift.levels + 1)):
+        what = f"the first looks at {shift.levels} levels and without a shift are {first} rollouts"
+        raise BadConfig(f"budget = {settings.budget}; {what}: pass budget={first} or more")
+
+
+def along_levels(settings: ThresholdSettings, shift: Shift) -> ThresholdSettings:
+    """The settings with the perturbations of all levels."""
+    return replace(settings, perturb=[*dict.fromkeys(map(shift.perturbation, range(1, shift.levels + 1)))])
+
+
 def with_levels(settings: ThresholdSettings, pools: LevelPools) -> ThresholdSettings:
     """The settings with the pools and the perturbations of all levels."""
-    shifts = [pools.shift.perturbation(level) for level in range(1, pools.shift.levels + 1)]
-    return replace(settings, pool=[str(pool.folder) for pool in pools.pools], perturb=[*dict.fromkeys(shifts)])
+    return replace(along_levels(settings, pools.shift), pool=[str(pool.folder) for pool in pools.pools])
 
 
 def outcomes_of(lines: Iterable[Mapping[str, Any]]) -> dict[RolloutId, bool | None]:

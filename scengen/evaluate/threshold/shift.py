@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from ...compose import load_task
+from ...envs.observations import cameras_of, proprioception
 from ...errors import BadConfig, UnknownName
 from ...evidence import ledger
+from ...look.looks import look_named
 from ...params import Value
 from ...perturb.effects import CONTROL
 from ...perturb.kinds import kinds
-from ...perturb.perturbation import NONE
+from ...perturb.perturbation import NONE, Perturbation
 from ...samplers.axis import Axis
 from ...samplers.dists import Fixed
 from ...samplers.split import ID, Part
@@ -27,7 +29,7 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Shift:
-    """What grows from level to level. Level 0 is without a shift."""
+    """What grows from level to level. Level 0 is no shift."""
 
     task: Task
     """The task; an axis has as many severities as there are levels."""
@@ -87,6 +89,19 @@ class Shift:
                 there = f"{name} = {shifted.get(name)}"
                 what = f"level {level} of {self.levels} is {dist.value:g}"
                 raise BadConfig(f"{where} has {there} in split {self.split(level)}; {what}: generate it again")
+
+    def check_observed(self, names: Sequence[str] | None, look: str) -> None:
+        """Raise `BadConfig` if a perturbation affects nothing that a policy observes.
+
+        Args:
+            names: names of streams and cameras; None for proprioception.
+            look: look of pictures.
+        """
+        robot = self.task.embodiment
+        observed, cameras = proprioception(robot) if names is None else names, cameras_of(robot)
+        shown = [cameras[name] for name in observed if name in cameras]
+        streams = [name for name in observed if name not in cameras]
+        Perturbation.parse(self.perturbation(1)).check(streams, shown, look_named(look))
 
     def value(self, level: float) -> str:
         """Values at a point between two levels, as text; empty if the axis has several."""
