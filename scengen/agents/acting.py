@@ -33,7 +33,7 @@ RETRIES = 3
 HOLD = Call("Hold", '{"ticks": 50}')
 """Call in place of refused ones."""
 HAND = "robot0_eef_pos"
-"""Stream with the position of the first hand [m], as the memory reports it."""
+"""Stream with the position of the first hand [m], which the memory states."""
 SEE = "see"
 POSES = "poses"
 POSES_SEEN = "poses_seen"

@@ -1,7 +1,7 @@
 """Colours and textures in place of those of things whose look carries no meaning.
 
-`conf/things/<task>.yaml` names their bodies. With any of them, they stay as far from all other things and from the
-table as people need to distinguish them, and take no hue that another thing has, which a text may name.
+`conf/things/<task>.yaml` names their bodies. Other colours keep a distance from those of all other things and of the
+table, so that people distinguish them, and from the hue of another thing, which a text may name.
 """
 
 from collections.abc import Collection
