@@ -331,7 +331,7 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
             if sha256(read_plain(path, MAX_HIT)) != entry["sha256"] or json.loads(json.dumps(found.plain())) != listed:
                 yield entry["file"], "the hit differs from the one that the manifest lists"
             elif entry["file"] != f"{HITS_FOLDER}/{found.name}.npz":
-                yield entry["file"], f"the hit has another name than {found.name}, or is listed twice"
+                yield entry["file"], f"the hit is not named {found.name}, or is listed twice"
             elif found.refutes and found.scenario in ids:
                 yield entry["file"], f"the pool holds {found.scenario}, which this hit refutes"
             elif why := (again := replayed(found, task)).fault:

@@ -209,7 +209,7 @@ def _checked_seed(recorded: Recorded, perturbation: Perturbation) -> int:
 
     Raises:
         ScengenError: a part shows nowhere.
-        ValueError: the seed is no whole number.
+        ValueError: the seed is not a whole number.
     """
     seed = recorded.told.get("scengen/perturb_seed", 0)
     if type(seed) is not int or seed < 0:
