@@ -234,8 +234,7 @@ def _false_words(hit: Hit, seconds: float | None, world: World, start: Mapping[s
             yield f"it says that it lacks the contact {' - '.join(pair)}, which {why}"
     for body in hit.unmoved:
         if body in made.moved or body not in start:
-            why = "moves" if body in made.moved else "is not a free body"
-            yield f"it says that {body} stays where it is, which {why}"
+            yield f"it says that {body} stays where it is, which {'moves' if body in start else 'is not a free body'}"
 
 
 class CausalContacts:

@@ -8,6 +8,7 @@ import sys
 import tempfile
 import threading
 import traceback
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -41,6 +42,7 @@ MAX_LINE = 3000
 def main() -> NoReturn:
     """Run one verb and leave with its exit status."""
     signals = Signals()
+    warnings.showwarning = print_warning
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]  # a name need not be Unicode
     status = run(sys.argv[1:], signals)
@@ -264,6 +266,14 @@ def _print_error(text: str) -> None:
     if len(words) > MAX_LINE:  # the remedy is at the end
         words = f"{words[: MAX_LINE // 2]} ... {words[-MAX_LINE // 2 :]}"
     print(words, file=sys.stderr, flush=True)
+
+
+def print_warning(message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: object) -> None:
+    """Print a warning as a line of the command line, and one that is meant for programmers as Python does."""
+    if issubclass(category, UserWarning):
+        _print_error(f"scengen: {message}")
+    else:
+        print(warnings.formatwarning(message, category, filename, lineno), end="", file=sys.stderr)
 
 
 def _failed(text: str, file: str = "") -> int:

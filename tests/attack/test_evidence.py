@@ -95,7 +95,7 @@ HITS = {
     "lacks a contact": ({"lacks": (("robot", "tile_0"),)}, "lacks the contact robot - tile_0, which it makes"),
     "lacks what is not there": ({"lacks": (("moon", "sun"),)}, "which the scene cannot have"),
     "moves the slab": ({"unmoved": ("slab",)}, "slab stays where it is, which moves"),
-    "a body of another scene": ({"unmoved": ("moon",)}, "which is no free body"),
+    "a body of another scene": ({"unmoved": ("moon",)}, "which is not a free body"),
 }
 
 

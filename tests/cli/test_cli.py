@@ -418,3 +418,9 @@ def test_an_interruption_in_a_function_that_c_has_called_is_not_lost():
     """C ignores errors, and Python would print a traceback: a compiler that was interrupted would go on."""
     done = subprocess.run([sys.executable, "-c", INSIDE_C], capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("ended in order 143\n", "")
+
+
+def test_a_warning_is_a_line_without_a_place_in_the_code(capsys):
+    program.print_warning(UserWarning("made on version 1"), UserWarning, "pools.py", 34)
+    program.print_warning(DeprecationWarning("old"), DeprecationWarning, "pools.py", 34)
+    assert capsys.readouterr().err == "scengen: made on version 1\npools.py:34: DeprecationWarning: old\n"

@@ -177,7 +177,7 @@ def _examined(
 
 
 def _perceived_of(about: Mapping[str, Any]) -> list[str]:
-    """What distinguishes episodes of the same actions: the scenario, and its look or its instruction."""
+    """Distinction of episodes of the same actions: the scenario, and its look or its instruction."""
     told = {name: str(about.get(f"scengen/{name}", "")) for name in ("id", "perturb", "perturb_seed")}
     with suppress(ScengenError):
         if Perturbation.parse(told["perturb"]).is_of_words:
