@@ -1,7 +1,7 @@
 """The level at which a chance of success falls to a given value, estimated from single looks at whole levels.
 
-Level 0 is no shift, 1 to n are the levels of an axis or a perturbation. The breaking point is a number of levels: 2.4
-lies between levels 2 and 3. A look is one rollout at a level, each of another scenario.
+Level 0 is without a shift, 1 to n are the levels of an axis or a perturbation. The breaking point is a number of
+levels: 2.4 lies between levels 2 and 3. A look is one rollout at a level, each of another scenario.
 
 A chance is taken to fall along a logistic curve between two plateaus, one above the value and one below it. The
 likelihood of a breaking point is its mean over slopes and plateaus of a grid. Two more candidates never cross the

@@ -40,7 +40,7 @@ def plot(results: Sequence[ThresholdResult], dark: bool = False) -> bytes:
         field.set_xlim(-0.5, result.shift.levels + 0.5)
         field.set_ylim(-3, 112)
         field.set_xticks(range(result.shift.levels + 1))
-        field.set_xlabel(f"level of {result.shift.name}, 0 is no shift", fontsize=8, color=text)
+        field.set_xlabel(f"level of {result.shift.name}, 0: without a shift", fontsize=8, color=text)
         field.set_ylabel("success [%]", fontsize=8, color=text)
         field.set_title(f"{result.settings.name} on {result.shift.task.name}", fontsize=9, color=text, loc="left")
         field.tick_params(colors=text, labelsize=8, length=0)

@@ -1,7 +1,7 @@
 """Pools of the levels of a shift: given ones, or fresh scenarios that are certified when they are needed.
 
 Fresh pools never grow: when the scenarios of a level are used up, another pool is drawn from another seed. Scenarios of
-different levels are no twins, so that the outcomes of all looks are independent.
+different levels are not twins, so that the outcomes of all looks are independent.
 """
 
 from collections.abc import Callable, Sequence

@@ -20,7 +20,7 @@ class Level:
     """Rollouts at a level in which the policy did not crash."""
 
     level: int
-    """Number of the level; 0 is no shift."""
+    """Number of the level; 0: without a shift."""
     value: str
     """Values of the shift."""
     rate: Rate | None

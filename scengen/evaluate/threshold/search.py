@@ -1,4 +1,4 @@
-"""The search for the level at which a policy breaks: rounds of rollouts, each at the levels that tell most."""
+"""The search for the level at which a policy breaks: rounds of rollouts, each at the levels that inform most."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

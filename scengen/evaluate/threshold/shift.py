@@ -29,7 +29,7 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Shift:
-    """What grows from level to level. Level 0 is no shift."""
+    """What grows from level to level. Level 0 is without a shift."""
 
     task: Task
     """The task; an axis has as many severities as there are levels."""
