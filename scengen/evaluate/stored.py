@@ -13,6 +13,7 @@ from .comparison import TABLE
 from .lines import FORMAT, RUN
 from .policies import BUILT_IN, REPLAY
 from .settings import EvaluateSettings
+from .threshold.settings import NAMES, ThresholdSettings
 
 OWN = {"observations": None, "action_repeat": 1}
 """Settings that a policy may decide itself, with the value of the settings then."""
@@ -46,6 +47,8 @@ class StoredRun:
     client: Mapping[str, Any] | None = None
     settle: bool = True
     keep: list[str] = field(default_factory=list)
+    threshold: Mapping[str, Any] = field(default_factory=dict)
+    """Settings that decide which rollouts a search for a threshold plays; empty for an evaluation."""
 
     @classmethod
     def of(cls, plain: Mapping[str, Any], path: Path) -> "StoredRun":
@@ -58,22 +61,25 @@ class StoredRun:
             raise BadConfig(f"{path} has format {cut(repr(given), 20)}; this version reads {FORMAT}")
         return typed(str(path), cls, plain)
 
-    def contradictions(self, settings: EvaluateSettings) -> Iterator[str]:
-        """Settings that differ from those of the table.
+    def contradictions(self, table: EvaluateSettings) -> Iterator[str]:
+        """Settings that are not those of the table.
 
         Args:
-            settings: those of the table.
+            table: settings of the table.
         """
         own = OWN if self.policy not in (*BUILT_IN, REPLAY) else {}
-        for name in sorted({f.name for f in fields(self)} & {*vars(settings)} - {"client", "format"}):
-            there, here = getattr(settings, name), getattr(self, name)
+        for name in sorted({f.name for f in fields(self)} & {*vars(table)} - {"client", "format"}):
+            there, here = getattr(table, name), getattr(self, name)
             if there != here and not (name in own and there == own[name]):
                 yield f"{TABLE} says {name} = {there!r:.60}, {RUN} has {here!r:.60}"
+        design = dict(table.design) if isinstance(table, ThresholdSettings) else {}
+        if design != self.threshold:
+            yield f"{TABLE} is of the search {design!r:.120}, {RUN} of {dict(self.threshold)!r:.120}"
 
 
 @dataclass(frozen=True)
 class StoredResult:
-    """The entries of a policy in `table.json` besides figures. The others are computed again from the lines."""
+    """The entries of a policy in `table.json` that are not figures. The others are computed again from the lines."""
 
     folder: str
     """Folder of the episodes, from that of the table."""
@@ -82,6 +88,7 @@ class StoredResult:
     lost: Mapping[str, str]
     arms: list[str]
     benign: Mapping[str, str]
+    drawn: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, plain: Any, path: Path) -> "StoredResult":
@@ -95,8 +102,8 @@ class StoredResult:
         found = typed(str(path), cls, {f.name: plain[f.name] for f in fields(cls) if f.name in plain})
         if found.folder != "." and found.folder not in {each.name for each in path.parent.iterdir()}:
             raise BadConfig(
-                f"{path} is about episodes in {cut(found.folder)!a}, which is not a folder next to it; "
-                "give a folder that scengen evaluate wrote"
+                f"{path} needs the folder {cut(found.folder)!a} beside it, and it is missing; "
+                "give a folder of scengen evaluate"
             )
         return found
 
@@ -110,7 +117,8 @@ class StoredResult:
             BadConfig: they are none with which anything can be evaluated.
         """
         try:
-            found = typed("settings", EvaluateSettings, {**self.settings, "to": str(folder / self.folder)})
+            kind = ThresholdSettings if NAMES & self.settings.keys() else EvaluateSettings
+            found = typed("settings", kind, {**self.settings, "to": str(folder / self.folder)})
             found.check()
         except ScengenError as error:
             raise BadConfig(f"{folder / TABLE}: {error}; give a folder that scengen evaluate wrote") from None
