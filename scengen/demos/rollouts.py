@@ -18,10 +18,9 @@ from ..pool.files import sha256
 from ..pool.row import DemonstrationRow, PoolRow
 from ..runs.attempts import reported_write_errors
 from ..runs.journal import Journal, Record
-from ..samplers.split import ID, Split
+from ..samplers.conditions import split_under
 from ..samplers.task import Task
-from ..scenario import Conditions
-from ..validate.impaired import impaired, impairment_in
+from ..validate.impaired import posed
 from ..validate.labels import made_with
 from ..validate.playable import stored_world
 from ..validate.rollout import replay
@@ -97,7 +96,7 @@ class _PoolKeeper:
         """Conditions of control under which the scenarios of the pool are posed."""
         self.config = DemonstrationConfig(
             task=about.task,
-            split=_split_under(about.split, self.conditions),
+            split=str(split_under(about.split, self.conditions)),
             sampler=about.sampler,
             seed=about.seed,
             runs=settings.rollouts,
@@ -149,10 +148,10 @@ class _PoolKeeper:
         """A row of the pool under the conditions of control: the row of the split that names them."""
         if self.conditions is None:
             return row
-        split = _split_under(row.split, self.conditions)
+        split = split_under(row.split, self.conditions)
         scenario = self.task.scenario(row.params, split)
-        text = impaired(row.scene_xml, impairment_in(row.scene_xml, self.conditions, row.id), row.embodiment)
-        labels = {"id": scenario.id, "split": split, "axes": Split.parse(split).axes}
+        text = posed(row.scene_xml, self.conditions, row.id)
+        labels = {"id": scenario.id, "split": str(split), "axes": split.axes}
         return replace(row, **labels, scene_xml=text, scene_sha256=sha256(text))
 
     def finish(self) -> DemosSummary:
@@ -160,8 +159,3 @@ class _PoolKeeper:
         records = self.journal.records()
         with reported_write_errors(self.folder):
             return finish(self.folder, self.task, self.config, len(records), records, self.journal, **self.driver)
-
-
-def _split_under(split: str, conditions: Conditions | None) -> str:
-    """A split with conditions of control."""
-    return "+".join(part for part in (split, str(conditions or ID)) if part != ID) or ID

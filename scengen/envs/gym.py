@@ -203,7 +203,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.observed = ObservationSettings(streams, cameras, width, height)
         shown = [] if render_mode is None else [cameras_of(self.task.embodiment).get(camera, camera)]
         self.perturbation.check([*streams], [*cameras.values(), *shown], self.look)
-        self.perturbation.check_words(Words.of(task, self.task.instruction, search))
+        if self.perturbation:
+            self.perturbation.check_words(Words.of(task, self.task.instruction, search))
         if self._needs_pictures:
             self.observed.check_picture_size(self.task, self._rows)
         self.metadata = {

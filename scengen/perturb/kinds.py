@@ -11,14 +11,12 @@ from functools import cache
 from pathlib import Path
 
 from ..errors import BadConfig, ScengenError, UnknownName, cut
+from ..samplers.conditions import LEVELS
 from ..samplers.task_files import conf_dir, packages
 from ..work.foreign import at_fault, factory_of, is_factory
 from ..work.plain import read_yaml
 from .effects import CONTROL, EFFECTS, LANGUAGE, OBJECTS, PICTURES, PROPRIOCEPTION, WRENCH, Effect, is_among
 from .language import NO_WORDINGS, WORDINGS, Words
-
-LEVELS = 5
-"""Number of levels of each kind."""
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,10 @@ class Perturbation:
         values = {}
         for name, level in self.parts:
             effect, rng = kinds()[name].effect, random("draw", name, scenario, seed)
-            drawn = effect.draw(kinds()[name].strengths[level - 1], rng)
-            values[name] = conditions.values(name, level, scenario, seed) if effect.reads == CONTROL else drawn
+            values[name] = (
+                conditions.values(name, level, scenario, seed)
+                if effect.reads == CONTROL
+                else effect.draw(kinds()[name].strengths[level - 1], rng)
+            )
         starts = tuple(f"{start}{body}_" for body in bodies for start in ("", "seen_"))
         return Drawn(scenario, seed, dict(self.parts), values, starts, words)

@@ -15,7 +15,7 @@ from ..errors import BadConfig
 from ..robots.panda import JOINTS
 from ..scenario import Conditions
 from .keyed import normals, unit
-from .split import Part
+from .split import Part, Split
 from .task_files import conf_dir
 
 LEVELS = 5
@@ -45,6 +45,12 @@ def check(part: Part) -> None:
     """Raise `BadConfig` unless a part of a split, whose axis is one of `KINDS`, has one of its levels."""
     if part.severity is None or not 1 <= part.severity <= LEVELS:
         raise BadConfig(f"split {part}: give {part.axis} a level from 1 to {LEVELS}, such as {part.axis}@3")
+
+
+def split_under(split: Split | str, conditions: Conditions | None) -> Split:
+    """A split under conditions."""
+    parts = (Part(kind, level) for kind, level in (conditions.parts if conditions else ()))
+    return Split((*Split.parse(split).parts, *parts))
 
 
 def impairment(conditions: Conditions, scenario: str, seed: int = 0) -> Impairment:

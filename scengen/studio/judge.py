@@ -19,6 +19,7 @@ from ..export.recording import CONTROL_ACTIONS
 from ..look.looks import ROOM
 from ..pictures.page import template
 from ..pool.untrusted import read_json
+from ..samplers.split import ID
 from ..sim.world import World
 from ..validate.rebuilt import rebuild
 from .player import Player
@@ -154,7 +155,8 @@ class Judge:
     def _load(self, episode: EpisodeData) -> None:
         """Replay the episode's actions in the scene of its parameters."""
         task = compose.load_task(episode.task, self._desk.search)
-        scenario = task.scenario(read_json(str(episode.about["scengen/params"])))
+        split = str(episode.about.get("scengen/split", ID))
+        scenario = task.scenario(read_json(str(episode.about["scengen/params"])), split)
         world = World.load(rebuild(scenario), task.embodiment, look=ROOM)
         with self._client.atomic():
             self._view.show(world)

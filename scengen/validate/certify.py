@@ -19,8 +19,7 @@ from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
 from ..sim.embodiment import JAW, action_size
 from ..sim.world import World
-from .impaired import held, impaired
-from .rebuilt import posed
+from .impaired import held, impaired, posed
 from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
 from .settings import QUICK, CertifySettings
 
@@ -145,7 +144,7 @@ class Trial:
             text, lost = scene_text.emit(self.scenario.build())
             if lost:
                 return {}, lost, "the emitted text has lost elements"
-            self.text = posed(text, self.scenario)
+            self.text = posed(text, self.scenario.conditions, self.scenario.under(None).id)
             self.world = self._load()
         except (ScengenError, ValueError) as error:
             return {}, {}, f"the scene does not compile: {_one_line(error)}"

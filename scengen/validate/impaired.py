@@ -19,27 +19,33 @@ TRIES = 20
 """Number of starts that are drawn until one is free of contact."""
 
 
-def impairment_in(text: str, conditions: Conditions, scenario: str, seed: int = 0) -> Impairment:
-    """What conditions do in a scene. Another start is the first one drawn in which the robot touches nothing new.
+def posed(text: str, conditions: Conditions | None, scenario: str, seed: int = 0) -> str:
+    """The text of a scene under conditions.
+
+    Another start is the first one drawn in which the robot touches nothing new.
 
     Args:
         text: the scene under the usual conditions, MJCF.
+        conditions: None for the usual ones.
         scenario: id of the scenario under the usual conditions.
         seed: another number draws other values.
 
     Raises:
         BadConfig: no start is free of contact, or the scene has conditions already.
     """
+    if conditions is None:
+        return text
     if Impairment.of_spec(from_mjcf(text)):
         raise BadConfig(f"{conditions}: the scene has conditions of control already; use that of its training twin")
-    drawn, arms = impairment(conditions, scenario, seed), len(hands(conditions.embodiment))
+    robot = conditions.embodiment
+    drawn, arms = impairment(conditions, scenario, seed), len(hands(robot))
     if not start(conditions, arms, scenario, seed, 0):
-        return drawn
-    usual = World.load(text, conditions.embodiment)
+        return impaired(text, drawn, robot)
+    usual = _contacts(World.load(text, robot))
     for attempt in range(TRIES):
-        found = dataclasses.replace(drawn, start=start(conditions, arms, scenario, seed, attempt))
-        world = World.load(impaired(text, found, conditions.embodiment), conditions.embodiment)
-        if _in_range(world) and not _contacts(world) - _contacts(usual):
+        moved = dataclasses.replace(drawn, start=start(conditions, arms, scenario, seed, attempt))
+        world = World.load(found := impaired(text, moved, robot), robot)
+        if _in_range(world) and not _contacts(world) - usual:
             return found
     raise BadConfig(f"{conditions}: none of {TRIES} starts is free of contact; ask for a lower level")
 

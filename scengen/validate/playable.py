@@ -11,7 +11,7 @@ from ..pool.rows import AnyRow
 from ..scenario import Conditions
 from ..sim.world import World
 from ..work.parallel import UNTRUSTED_LIMITS, Workers, apart, each
-from .impaired import impaired, impairment_in
+from .impaired import posed
 
 Played = tuple[str, str, Actions]
 """A scene, MJCF, its robot, and actions."""
@@ -41,10 +41,7 @@ def stored_world(row: SceneRow, look: Look | None = None, conditions: Conditions
         BadConfig: the scene has no free start under these conditions, or has conditions already.
     """
     with scene_errors(f" of {row.name}"):
-        text = row.scene_xml
-        if conditions:
-            text = impaired(text, impairment_in(text, conditions, row.id, seed), row.embodiment)
-        return World.load(text, row.embodiment, look)
+        return World.load(posed(row.scene_xml, conditions, row.id, seed), row.embodiment, look)
 
 
 @contextmanager

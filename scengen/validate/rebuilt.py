@@ -13,7 +13,7 @@ from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.embodiment import JAW
 from ..sim.world import World
-from .impaired import impaired, impairment_in
+from .impaired import posed
 
 MAX_RELATIVE_DIFFERENCE = 1e-9
 """Largest relative difference of equal numbers on machines with different rounding."""
@@ -52,20 +52,12 @@ NOT_REBUILT = "the scene is not the one that the family builds from the paramete
 
 
 def rebuild(scenario: Scenario) -> str:
-    """The text of a scenario's scene, under its conditions."""
-    return posed(scene_text.emit(scenario.build())[0], scenario)
-
-
-def posed(text: str, scenario: Scenario) -> str:
-    """The text of a scenario's scene, given that under the usual conditions.
+    """The text of a scenario's scene, under its conditions.
 
     Raises:
-        BadConfig: see `impairment_in`.
+        BadConfig: no start is free of contact.
     """
-    conditions = scenario.conditions
-    if conditions is None:
-        return text
-    return impaired(text, impairment_in(text, conditions, scenario.under(None).id), conditions.embodiment)
+    return posed(scene_text.emit(scenario.build())[0], scenario.conditions, scenario.under(None).id)
 
 
 def world_of(scenario: Scenario, embodiment: str = JAW) -> World:

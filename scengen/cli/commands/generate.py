@@ -15,9 +15,9 @@ from ...perturb.perturbation import NONE, Perturbation
 from ...pool import collection
 from ...runs.generate import GenerateSettings, Summary, generate
 from ...runs.progress import ProgressBar
-from ...samplers.conditions import KINDS
+from ...samplers.conditions import KINDS, split_under
 from ...samplers.designs import SOBOL
-from ...samplers.split import ID, Split
+from ...samplers.split import Split
 from ...samplers.task import Task
 from ...validate.settings import CertifySettings
 from ..tables import attack_table, funnel_table, summary_lines
@@ -138,8 +138,7 @@ def _under_conditions(settings: GenerateSettings, task: Task) -> GenerateSetting
             "stay as they are: give it to evaluate, record or an environment. generate certifies under "
             f"{', '.join(KINDS)}"
         )
-    parts = [part for part in (settings.split, str(conditions)) if part != ID]
-    return replace(settings, split="+".join(parts), perturb=NONE)
+    return replace(settings, split=str(split_under(settings.split, conditions)), perturb=NONE)
 
 
 def _valid_runs(requested: Sequence[Combination]) -> tuple[list[Combination], list[Run]]:
