@@ -146,3 +146,13 @@ def test_a_damaged_file_is_refused_in_one_line(text, tmp_path):
     path.write_text(text)
     with pytest.raises(BadConfig):
         free_bodies(path)
+
+
+def test_colours_and_prints_of_the_same_things_are_refused():
+    with pytest.raises(BadConfig, match="change the look of the same things: give one of them"):
+        Perturbation.parse("thing_colour@1+thing_texture@1")
+
+
+def test_things_of_an_unknown_task_are_refused():
+    with pytest.raises(BadConfig, match="thing_colour: give words="):
+        Perturbation.parse("thing_colour@1").of("a").on_model(loaded("domino_single"))
