@@ -69,12 +69,16 @@ class Drawn:
         """Change lights, colours and cameras of a compiled scene, once.
 
         Raises:
-            BadConfig: the task names no body whose look carries no meaning, for a part that changes such bodies.
+            BadConfig: a part changes bodies whose look carries no meaning, and the task names none, or no words were
+                given.
         """
         for name in sorted(self.values, key=lambda name: self.effects[name].on_things is None):  # before the table
             effect, values = self.effects[name], self.values[name]
             if effect.on_things is not None:
-                assert self.words is not None, "who draws for things gives the words of their task"
+                if self.words is None:
+                    raise BadConfig(
+                        f"{name}: give words=Words.of(task, instruction), which name the things of the task"
+                    )
                 if lacks := kinds()[name].lacks(self.words):
                     raise BadConfig(f"{name}: {lacks}")
                 effect.on_things(model, values, self.words.free)

@@ -329,7 +329,7 @@ def test_a_scene_is_left_as_it_was(stage):
     model, before = stage.world.model, arrays(stage.world.model)
     for name, kind in kinds().items():
         if kind.effect.reads == PICTURES:
-            with Perturbation(((name, 5),)).of("a").while_applied(model):
+            with Perturbation(((name, 5),)).of("a", words=stage.words).while_applied(model):
                 pass
     assert all(array.tobytes() == before[name].tobytes() for name, array in arrays(model).items())
 
