@@ -13,6 +13,7 @@ from .comparison import TABLE
 from .lines import FORMAT, RUN
 from .policies import BUILT_IN, REPLAY
 from .settings import EvaluateSettings
+from .threshold.settings import NAMES, ThresholdSettings
 
 OWN = {"observations": None, "action_repeat": 1}
 """Settings that a policy may decide itself, with the value of the settings then."""
@@ -46,6 +47,8 @@ class StoredRun:
     client: Mapping[str, Any] | None = None
     settle: bool = True
     keep: list[str] = field(default_factory=list)
+    threshold: Mapping[str, Any] = field(default_factory=dict)
+    """Settings that decide which rollouts a search for a threshold plays; empty for an evaluation."""
 
     @classmethod
     def of(cls, plain: Mapping[str, Any], path: Path) -> "StoredRun":
@@ -69,6 +72,9 @@ class StoredRun:
             there, here = getattr(settings, name), getattr(self, name)
             if there != here and not (name in own and there == own[name]):
                 yield f"{TABLE} says {name} = {there!r:.60}, {RUN} has {here!r:.60}"
+        design = dict(settings.design) if isinstance(settings, ThresholdSettings) else {}
+        if design != self.threshold:
+            yield f"{TABLE} is of the search {design!r:.120}, {RUN} of {dict(self.threshold)!r:.120}"
 
 
 @dataclass(frozen=True)
@@ -82,6 +88,7 @@ class StoredResult:
     lost: Mapping[str, str]
     arms: list[str]
     benign: Mapping[str, str]
+    drawn: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, plain: Any, path: Path) -> "StoredResult":
@@ -110,7 +117,8 @@ class StoredResult:
             BadConfig: they are none with which anything can be evaluated.
         """
         try:
-            found = typed("settings", EvaluateSettings, {**self.settings, "to": str(folder / self.folder)})
+            kind = ThresholdSettings if NAMES & self.settings.keys() else EvaluateSettings
+            found = typed("settings", kind, {**self.settings, "to": str(folder / self.folder)})
             found.check()
         except ScengenError as error:
             raise BadConfig(f"{folder / TABLE}: {error}; give a folder that scengen evaluate wrote") from None
