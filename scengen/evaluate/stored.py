@@ -61,25 +61,25 @@ class StoredRun:
             raise BadConfig(f"{path} has format {cut(repr(given), 20)}; this version reads {FORMAT}")
         return typed(str(path), cls, plain)
 
-    def contradictions(self, settings: EvaluateSettings) -> Iterator[str]:
-        """Settings that differ from those of the table.
+    def contradictions(self, table: EvaluateSettings) -> Iterator[str]:
+        """Settings that are not those of the table.
 
         Args:
-            settings: those of the table.
+            table: settings of the table.
         """
         own = OWN if self.policy not in (*BUILT_IN, REPLAY) else {}
-        for name in sorted({f.name for f in fields(self)} & {*vars(settings)} - {"client", "format"}):
-            there, here = getattr(settings, name), getattr(self, name)
+        for name in sorted({f.name for f in fields(self)} & {*vars(table)} - {"client", "format"}):
+            there, here = getattr(table, name), getattr(self, name)
             if there != here and not (name in own and there == own[name]):
                 yield f"{TABLE} says {name} = {there!r:.60}, {RUN} has {here!r:.60}"
-        design = dict(settings.design) if isinstance(settings, ThresholdSettings) else {}
+        design = dict(table.design) if isinstance(table, ThresholdSettings) else {}
         if design != self.threshold:
             yield f"{TABLE} is of the search {design!r:.120}, {RUN} of {dict(self.threshold)!r:.120}"
 
 
 @dataclass(frozen=True)
 class StoredResult:
-    """The entries of a policy in `table.json` besides figures. The others are computed again from the lines."""
+    """The entries of a policy in `table.json` that are not figures. The others are computed again from the lines."""
 
     folder: str
     """Folder of the episodes, from that of the table."""
@@ -102,8 +102,8 @@ class StoredResult:
         found = typed(str(path), cls, {f.name: plain[f.name] for f in fields(cls) if f.name in plain})
         if found.folder != "." and found.folder not in {each.name for each in path.parent.iterdir()}:
             raise BadConfig(
-                f"{path} is about episodes in {cut(found.folder)!a}, which is not a folder next to it; "
-                "give a folder that scengen evaluate wrote"
+                f"{path} needs the folder {cut(found.folder)!a} beside it, and it is missing; "
+                "give a folder of scengen evaluate"
             )
         return found
 
