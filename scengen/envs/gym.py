@@ -237,6 +237,10 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """The paper's names of the cameras of the observation."""
         return tuple(self.observed.cameras)
 
+    def check_observations(self, names: Sequence[str]) -> None:
+        """Raise `UnknownName` for the first name that is neither a stream nor a camera of the environment."""
+        _requested(names, self.task, self._rows, lambda: self.scenario.orientation)
+
     @property
     def task_description(self) -> str:
         """The instruction: that of the running scenario as a perturbation words it, or one that `instruct` gave."""

@@ -131,7 +131,7 @@ class PolicyPlayer:
     def _tried(self, rollouts: "Sequence[_Rollout]", part: str, call: Callable[[], A]) -> A | None:
         """Return value of a part of a policy; None if it crashes, which ends its rollouts."""
         try:
-            with policy_errors(self.settings.name, part):
+            with policy_errors(self.settings.name, part, rollouts[0].env):
                 return call()
         except ForeignCode as error:
             if self.strict:
