@@ -228,6 +228,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             return _revived, (type(self), self._arguments, self._progress())
 
     @property
+    def arguments(self) -> Mapping[str, Any]:
+        """Arguments of `__init__`, with the folders of pools by their absolute paths."""
+        return dict(self._arguments)
+
+    @property
     def streams(self) -> Mapping[str, Stream]:
         """Streams of the observation, by name."""
         return self.observed.streams

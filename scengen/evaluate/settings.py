@@ -45,7 +45,10 @@ MAX_FOLDER_NAME = 100
 
 @dataclass(frozen=True)
 class EvaluateSettings:
-    """Settings of `scengen evaluate`; conf/command/evaluate.yaml explains them."""
+    """Settings of `scengen evaluate`; conf/command/evaluate.yaml explains them.
+
+    `benign` holds the pools of that arm, and `harness` the name of the program that played the episodes instead.
+    """
 
     policy: str | list[str] = ""
     pool: str | list[str] | None = None
@@ -74,6 +77,7 @@ class EvaluateSettings:
     arms: str | list[str] = AUTO
     format: list[str] = field(default_factory=list)
     benign: list[str] = field(default_factory=list)
+    harness: str | None = None
 
     @cached_property
     def folders(self) -> list[str]:
@@ -181,7 +185,7 @@ class EvaluateSettings:
         for name in self.format:
             if name not in (LATEX, PROFILE):
                 raise UnknownName("format", name, (LATEX, PROFILE))
-        if not self._gets_text:
+        if not self._gets_text and not self.harness:
             self.check_no_text()
         look_named(self.look)
         if self.splits not in SPLITS:

@@ -47,6 +47,7 @@ class StoredRun:
     client: Mapping[str, Any] | None = None
     settle: bool = True
     keep: list[str] = field(default_factory=list)
+    harness: str | None = None
     threshold: Mapping[str, Any] = field(default_factory=dict)
     """Settings that decide which rollouts a search for a threshold plays; empty for an evaluation."""
 
