@@ -9,7 +9,11 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsFloat
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
 
 from ..envs.gym import Observation, PoolEnv
 from ..errors import BadConfig
@@ -108,7 +112,9 @@ class Recorder:
         self._lines.add(rollout.record)
 
     def finish(self) -> Path:
-        """Sort the lines and write the tables. Returns the folder."""
+        """Sort the lines and write the tables, if there are lines. Returns the folder."""
+        if self._is_closed or not self._log.records:
+            return self.settings.folder
         self._lines.sort()
         found = Evaluation(list(self._log.records), 0, {}, (), {}, self._lines.chain)
         for path, text in Comparison([PolicyResult(self.settings, found)]).files(self.settings.folder).items():
@@ -120,8 +126,7 @@ class Recorder:
         if not self._is_closed:
             for rollout in [*self._open.values()]:
                 self._leave(rollout.env)
-            if self._log.records:
-                self.finish()
+            self.finish()
             self._log.__exit__(None, None, None)
             self._is_closed = True
             atexit.unregister(self.close)
@@ -131,6 +136,36 @@ class Recorder:
         if rollout := self._open.pop(id(env), None):
             record = crashed_record(rollout.which, LEFT)
             self._lines.add({**record, **rollout.start})
+
+
+class RecordedEpisodes(gymnasium.Wrapper[Observation, NDArray[np.float32], Observation, NDArray[np.float32]]):
+    """An environment whose episodes a recorder writes. Episodes that an automatic reset starts, without a seed and
+    without the name of a scenario, are not counted."""
+
+    def __init__(self, env: PoolEnv, recorder: Recorder):
+        super().__init__(env)
+        self._pool_env, self._recorder = env, recorder
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """See `PoolEnv.reset`."""
+        seen, info = self.env.reset(seed=seed, options=options)
+        if seed is not None or "scenario" in (options or {}):
+            self._recorder.begin(self._pool_env, seen)
+        return seen, info
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
+        """See `PoolEnv.step`."""
+        seen, reward, terminated, truncated, info = self.env.step(action)
+        if terminated or truncated:
+            self._recorder.end(self._pool_env, info)
+        return seen, reward, terminated, truncated, info
+
+    def close(self) -> None:
+        """Write the tables. The folder is free when the program ends, or the recorder is closed."""
+        super().close()
+        self._recorder.finish()
 
 
 def settings_of(to: Path, player: Player, env: PoolEnv) -> EvaluateSettings:
