@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..envs.gym import Observation, PoolEnv
 from ..errors import BadConfig
-from ..perturb.perturbation import NONE, Perturbation
+from ..perturb.perturbation import Perturbation
 from ..pool import Pool, kinds
 from ..pool.files import sha256
 from ..work.log import Log
@@ -27,7 +27,7 @@ from .arms import NONE as NO_ARMS
 from .comparison import Comparison, PolicyResult
 from .lines import RUN
 from .player import Rollout
-from .rollouts import Evaluation, LineLog, crashed_record, id_of, identity
+from .rollouts import Evaluation, LineLog, crashed_record, identity
 from .scenarios import known
 from .settings import EvaluateSettings, RolloutId
 
@@ -50,7 +50,9 @@ class Player:
 class Recorder:
     """Writes the lines of the episodes of one or more environments with the same settings, one process at a time."""
 
-    def __init__(self, to: str | Path, player: Player, env: PoolEnv, search: Sequence[str] = ()):
+    def __init__(
+        self, to: str | Path, player: Player, env: PoolEnv, search: Sequence[str] = (), replaces: bool = False
+    ):
         """Open the folder, or continue it.
 
         Args:
@@ -58,6 +60,7 @@ class Recorder:
             player: who plays.
             env: an environment in which episodes are played.
             search: folders of other packages, see `task_files.search_path`.
+            replaces: whether lines of an earlier run are replaced, by a program that plays all of them again.
 
         Raises:
             ScengenError: the folder is something else, or holds episodes of other settings.
@@ -66,6 +69,9 @@ class Recorder:
         self.settings.check()
         kinds.check_target(self.settings.folder, kinds.EPISODES)
         try_folder(self.settings.folder)
+        if replaces:
+            for name in (kinds.EPISODES, RUN):
+                (self.settings.folder / name).unlink(missing_ok=True)
         pools = [Pool.open(folder).check() for folder in self.settings.folders]
         about = {key: told for pool in pools for key, told in known(pool, search).items()}
         self._folder_of = {id_: folder for folder, id_ in about}
@@ -82,34 +88,37 @@ class Recorder:
         self._is_closed = False
         atexit.register(self.close)
 
-    def begin(self, env: PoolEnv, seen: Observation, rollout: int | None = None) -> None:
+    def begin(self, env: PoolEnv, seen: Observation) -> None:
         """Note the start of an episode; one that is still open in this environment was left.
 
         Args:
             env: the environment, after its reset.
             seen: the first observation.
-            rollout: number of the rollout of the scenario; by default the next one.
         """
         self._leave(env)
-        perturbation, scenario = str(env.perturbation) or NONE, env.row.id
-        number = self._counts[scenario, perturbation] if rollout is None else rollout
+        perturbation, scenario = str(env.perturbation), env.row.id
+        number = self._counts[scenario, perturbation]
         self._counts[scenario, perturbation] += 1
         which = RolloutId(env.row.task, perturbation, CLEAN, self._folder_of[scenario], scenario, number)
         self._open[id(env)] = Rollout(which, env)
         self._open[id(env)].begin(seen)
 
     def end(self, env: PoolEnv, info: Mapping[str, Any]) -> None:
-        """Store the line of the episode that is open in an environment; nothing if none is, or the line is there.
+        """Store the line of the episode that is open in an environment; nothing if none is.
 
         Args:
             info: the last `info` of the environment, with `success`, `reason` and `lacks`.
         """
         rollout = self._open.pop(id(env), None)
-        if rollout is None or rollout.which in map(id_of, self._log.records):
+        if rollout is None:
             return
         success = bool(info["success"])
         rollout.end(success, "" if success else str(info["reason"]), lacks=str(info.get("lacks", "")))
         self._lines.add(rollout.record)
+
+    def discard(self) -> None:
+        """Forget episodes that are open: a later run plays them."""
+        self._open.clear()
 
     def finish(self) -> Path:
         """Sort the lines and write the tables, if there are lines. Returns the folder."""
