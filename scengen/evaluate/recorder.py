@@ -37,7 +37,7 @@ LEFT = "the episode was left before its end"
 
 @dataclass(frozen=True)
 class Player:
-    """Who plays the episodes."""
+    """Program and policy that play the episodes."""
 
     harness: str
     """Name of the program, such as `lerobot-eval`."""
