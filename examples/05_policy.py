@@ -12,6 +12,8 @@ ID, AXIS = Path(__file__).parents[1] / "generated" / "reference", "generated/exa
 
 
 class Habit:
+    observations = ("robot0_eef_pos", "object-state")  # what it needs; scengen evaluate follows
+
     def __init__(self, env):
         self.names = env.metadata["names"]["object-state"]  # one for each number of the stream
 
@@ -34,5 +36,5 @@ class Habit:
 
 generate = ["generate", "task=domino_single", "split=low_starter", "n=3", f"pool={AXIS}"]
 evaluate = ["evaluate", "policy=__main__:Habit", f"pool={ID},{AXIS}", "seeds=3", "rollouts=1"]
-evaluate += ["observations=[robot0_eef_pos,object-state]", "to=generated/examples/habit"]
+evaluate += ["to=generated/examples/habit"]
 sys.exit(run(generate) or run(evaluate))  # the same as `scengen generate ...` and `scengen evaluate ...`

@@ -2,7 +2,7 @@
 
     python check.py POOL [POOL ...]
 
-Every scenario of the pools is played in both. Exit status 1 if a verdict differs.
+Every scenario of the pools is played in both. Exit status 1 if a verdict differs, or the lines do not verify.
 """
 
 import sys
@@ -16,6 +16,7 @@ from inspect_robots.scene import Scene
 from inspect_robots.types import Action, ActionChunk, Observation
 from inspect_robots_scengen import ScengenEmbodiment, scengen_task
 
+from scengen import cli
 from scengen.evaluate.policies import NearestReplay
 from scengen.evaluate.verdicts import compared, replay_verdicts
 from scengen.pool import Pool
@@ -46,16 +47,18 @@ def main() -> int:
     count = min(len(Pool.open(folder)) for folder in pools)
     there: dict[str, bool] = {}
     with TemporaryDirectory() as folder:
-        body = ScengenEmbodiment(",".join(pools), hz=100, cameras=False)
+        lines = f"{folder}/lines"
+        body = ScengenEmbodiment(",".join(pools), hz=100, cameras=False, lines=lines, policy="replay")
         assert_embodiment_conformant(body.info)
         for split in sorted(splits):
             task = scengen_task(",".join(pools), split=split, n=count)
             (log,) = inspect_robots.eval(task, Replay(body), body, log_dir=folder, store_actions=False)
             there |= {sample.scene_id: bool(sample.reduced["success_at_end"]) for sample in log.samples}
         body.close()
+        sound = cli.run(["verify", f"results={lines}"]) == 0
     line, same = compared(there, replay_verdicts(pools))
     print(line)
-    return 0 if same else 1
+    return 0 if same and sound else 1
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from scengen.assets.prop import TABLE_TOP
 from scengen.control.osc import STEP, TURN
 from scengen.envs.gym import PoolEnv, action_repeat_at
 from scengen.envs.pools import rows_of
+from scengen.evaluate.recorder import Player, Recorder
 from scengen.perturb.language import Words
 from scengen.perturb.perturbation import Perturbation
 from scengen.pool import Pool
@@ -41,6 +42,8 @@ class ScengenEmbodiment(EmbodimentBase):
         rules: str = "strict",
         perturb: str | None = None,
         perturb_seed: int = 0,
+        lines: str | None = None,
+        policy: str = "policy",
     ):
         """
         Args:
@@ -52,6 +55,8 @@ class ScengenEmbodiment(EmbodimentBase):
             rules: `strict` or `paper`.
             perturb: kinds of perturbation at their levels, such as `light_direction@3+noise@1`.
             perturb_seed: another number draws other perturbations for the same scenarios.
+            lines: folder for lines as those of `scengen evaluate`, which `scengen verify results=` rebuilds.
+            policy: name of the policy in the lines.
 
         Raises:
             ScengenError: a setting or a pool is not valid.
@@ -71,6 +76,7 @@ class ScengenEmbodiment(EmbodimentBase):
             perturb=perturb,
             perturb_seed=perturb_seed,
         )
+        self.recorder = Recorder(lines, Player("inspect-robots", policy), self.env) if lines else None
         arms = len(hands(embodiment))
         sides = [""] if arms == 1 else ["right_", "left_"]
         self.units = np.tile(UNITS, arms)
@@ -110,6 +116,8 @@ class ScengenEmbodiment(EmbodimentBase):
     def reset(self, scene: Scene, *, seed: int | None = None) -> Observation:
         """Start the scenario with the id of the scene. Scenarios are stored, so the seed has no effect."""
         observation, _ = self.env.reset(options={"scenario": scene.id})
+        if self.recorder:
+            self.recorder.begin(self.env, observation)
         return self._observed(observation)
 
     def step(self, action: Action) -> StepResult:
@@ -117,6 +125,8 @@ class ScengenEmbodiment(EmbodimentBase):
         given = np.clip(np.asarray(action.data, float) / self.units, -1.0, 1.0)
         observation, reward, terminated, truncated, info = self.env.step(given)
         success, ended = bool(info["success"]), terminated or truncated
+        if self.recorder and (success or ended):
+            self.recorder.end(self.env, info)
         reason = ("success" if success else info["reason"] or "failure") if ended else None
         return StepResult(
             self._observed(observation),
@@ -128,8 +138,10 @@ class ScengenEmbodiment(EmbodimentBase):
         )
 
     def close(self) -> None:
-        """Free the renderer."""
+        """Free the renderer, and write the tables of the lines."""
         self.env.close()
+        if self.recorder:
+            self.recorder.finish()
 
     def _observed(self, seen: dict) -> Observation:
         return Observation(

@@ -2,16 +2,18 @@
 
     python check.py POOL [POOL ...]
 
-Every scenario of the pools is played in both. Exit status 1 if a verdict differs.
+Every scenario of the pools is played in both. Exit status 1 if a verdict differs, or the lines do not verify.
 """
 
 import sys
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import torch
 from lerobot.scripts.lerobot_eval import rollout
 from lerobot_env_scengen import ScengenEnv
 
+from scengen import cli
 from scengen.envs.gym import PoolEnv
 from scengen.evaluate.policies import NearestReplay
 from scengen.evaluate.verdicts import compared, replay_verdicts
@@ -39,10 +41,11 @@ class Replay(torch.nn.Module):
         return torch.from_numpy(np.array([policy.act({}) for policy in self.policies], np.float32))
 
 
-def lerobot_verdicts(pools: list[str]) -> dict[str, bool]:
-    """Whether each scenario is solved in LeRobot's rollout, by id."""
+def lerobot_verdicts(pools: list[str], lines: str) -> dict[str, bool]:
+    """Whether each scenario is solved in LeRobot's rollout, by id; lines of the episodes are written into a folder."""
     first = next(Pool.open(pools[0]).rows(witness=False))
-    config, found = ScengenEnv(task=first.task, pool=",".join(pools), fps=100), {}
+    told = {"lines": lines, "policy_name": "replay"}
+    config, found = ScengenEnv(task=first.task, pool=",".join(pools), fps=100, **told), {}
     memory = Library([Pool.open(folder) for folder in pools]).of_split("id")
     for vector in (batches[0] for batches in config.create_envs(n_envs=1).values()):
         env = vector.envs[0].unwrapped
@@ -60,9 +63,11 @@ def _same(value: object) -> object:
 
 def main() -> int:
     pools = sys.argv[1:]
-    line, same = compared(lerobot_verdicts(pools), replay_verdicts(pools))
+    with TemporaryDirectory() as folder:
+        line, same = compared(lerobot_verdicts(pools, f"{folder}/lines"), replay_verdicts(pools))
+        sound = cli.run(["verify", f"results={folder}/lines"]) == 0
     print(line)
-    return 0 if same else 1
+    return 0 if same and sound else 1
 
 
 if __name__ == "__main__":

@@ -213,5 +213,10 @@ def make_policy(env) -> Policy:
     return Policy(os.environ["WEIGHTS"])
 
 
+make_policy.observations = (*CAMERAS, "robot0_eef_pos", "robot0_eef_quat", "robot0_gripper_qpos")
+make_policy.action_repeat = 4
+make_policy.language = False
+
+
 if __name__ == "__main__":
     {"collect": collect, "train": train}[sys.argv[1]](*sys.argv[2:])

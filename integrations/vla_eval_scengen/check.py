@@ -2,7 +2,7 @@
 
     python check.py POOL [POOL ...]
 
-Every scenario of the pools is played in both. Exit status 1 if a verdict differs.
+Every scenario of the pools is played in both. Exit status 1 if a verdict differs, or the lines do not verify.
 """
 
 import json
@@ -20,6 +20,7 @@ from vla_eval.model_servers.serve import serve
 from vla_eval.specs import RAW, DimSpec
 from vla_eval.types import Action, Observation
 
+from scengen import cli
 from scengen.envs.gym import PoolEnv
 from scengen.evaluate.policies import NearestReplay
 from scengen.evaluate.verdicts import compared, replay_verdicts
@@ -27,6 +28,8 @@ from scengen.pool import Pool
 from scengen.pool.library import Library
 
 PORT = 8753
+LINES = "lines"
+"""Folder of the lines."""
 
 
 class ReplayServer(PredictModelServer):
@@ -65,7 +68,13 @@ def theirs(pools: list[str], folder: Path) -> dict[str, bool]:
             {
                 "benchmark": "vla_eval_scengen:ScengenBenchmark",
                 "episodes_per_task": min(len(Pool.open(pool)) for pool in pools),
-                "params": {"task": first.task, "pool": pools, "hz": 100},
+                "params": {
+                    "task": first.task,
+                    "pool": pools,
+                    "hz": 100,
+                    "lines": str(folder / LINES),
+                    "policy": "replay",
+                },
             }
         ],
     }
@@ -102,8 +111,9 @@ def main() -> int:
     pools = [str(Path(pool).absolute()) for pool in sys.argv[1:]]
     with TemporaryDirectory() as folder:
         line, same = compared(theirs(pools, Path(folder)), replay_verdicts(pools))
+        sound = cli.run(["verify", f"results={Path(folder) / LINES}"]) == 0
     print(line)
-    return 0 if same else 1
+    return 0 if same and sound else 1
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from scengen.envs.gym import PoolEnv, action_repeat_at
 from scengen.envs.observations import proprioception
 from scengen.envs.pools import rows_of
 from scengen.errors import BadConfig
+from scengen.evaluate.recorder import Player, Recorder
 from scengen.sim.embodiment import action_size
 
 
@@ -45,6 +46,8 @@ class ScengenBenchmark(StepBenchmark):
         rules: str = "strict",
         perturb: str | None = None,
         perturb_seed: int = 0,
+        lines: str | None = None,
+        policy: str = "policy",
     ):
         """
         Args:
@@ -58,6 +61,8 @@ class ScengenBenchmark(StepBenchmark):
             rules: `strict` or `paper`.
             perturb: kinds of perturbation at their levels, such as `light_direction@3+noise@1`. Results name them.
             perturb_seed: another number draws other perturbations for the same scenarios.
+            lines: folder for lines as those of `scengen evaluate`, which `scengen verify results=` rebuilds.
+            policy: name of the policy in the lines.
 
         Raises:
             ScengenError: a setting or a pool is not valid.
@@ -80,7 +85,8 @@ class ScengenBenchmark(StepBenchmark):
             "perturb": perturb,
             "perturb_seed": perturb_seed,
         }
-        self._env(self.splits[0])  # what is not valid is refused here
+        first = self._env(self.splits[0])  # what is not valid is refused here
+        self.recorder = Recorder(lines, Player("vla-eval", policy), first) if lines else None
 
     def get_tasks(self) -> list[Task]:
         """A task for every split. vla-eval passes it to the model server, which must not read the name."""
@@ -96,12 +102,16 @@ class ScengenBenchmark(StepBenchmark):
             )
         self._running = env
         observation, _ = env.reset(options={"scenario": env.scenarios[number]})
+        if self.recorder:
+            self.recorder.begin(env, observation)
         return observation
 
     def step(self, action: Action) -> StepResult:
         """Play one action for one period of the policy."""
         given = action.get("actions", action.get("action"))
         observation, reward, terminated, truncated, info = self._running.step(given)
+        if self.recorder and (terminated or truncated):
+            self.recorder.end(self._running, info)
         self._recorder.record_step(reward=reward, done=terminated or truncated, success=bool(info["success"]))
         return StepResult(observation, reward, terminated or truncated, info)
 
@@ -146,9 +156,11 @@ class ScengenBenchmark(StepBenchmark):
         return {**dict.fromkeys(self.cameras, IMAGE_RGB), "state": state, "language": LANGUAGE}
 
     def cleanup(self) -> None:
-        """Free the renderers."""
+        """Free the renderers, and write the tables of the lines."""
         for env in self._envs.values():
             env.close()
+        if self.recorder:
+            self.recorder.finish()
 
     def _env(self, split: str) -> PoolEnv:
         if split not in self._envs:

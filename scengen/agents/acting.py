@@ -12,6 +12,7 @@ from ..assets.prop import TABLE_HALF, TABLE_TOP
 from ..control.loop import Loop
 from ..envs.gym import Observation, PoolEnv
 from ..envs.object_state import xyzw
+from ..evaluate.recorder import Recorder
 from ..geometry import Vec3
 from ..sim.boxes import box_around
 from ..sim.embodiment import hands
@@ -63,6 +64,8 @@ class Episode:
     over: str = ""
     """Reason of the end; empty while it is open."""
     success: bool = False
+    lacks: str = ""
+    """Means of the task without which the goal was reached."""
     refused: int = 0
     """Number of calls that were refused."""
     steps: list[str] = field(default_factory=list)
@@ -78,7 +81,7 @@ class Episode:
         frames = {name: picture for batch in self.frames for name, picture in batch.items()}
         text = prompt(
             "act",
-            instruction=" ".join(self.env.instruction.split()),
+            instruction=" ".join(self.env.task_description.split()),
             robot=robot(self.exam.row.embodiment),
             controller=controller(self.exam.row.embodiment),
             table=TABLE_TOP,
@@ -115,6 +118,11 @@ class Episode:
         return found
 
     @property
+    def end(self) -> dict[str, Any]:
+        """Outcome of the trial, as in the last `info` of the environment."""
+        return {"success": self.success, "reason": self.over, "lacks": self.lacks}
+
+    @property
     def told(self) -> dict[str, Any]:
         """Result of the trial, as plain data."""
         return {
@@ -143,6 +151,7 @@ class Episode:
             self.ticks += 1
             if terminated or truncated:
                 self.over, self.success = info["reason"] or "success", bool(info["success"])
+                self.lacks = info["lacks"]
             elif self.ticks >= MAX_TICKS:
                 self.over = f"{MAX_TICKS} ticks are over"
             if self.over:
@@ -153,7 +162,14 @@ class Episode:
         return f"{self.neutral(why)}, after {(self.ticks - before) * Loop.PERIOD:.2f} s, hand at ({at})"
 
 
-def act(exam: Exam, calls: Calls, env: PoolEnv, mode: str, twins: Sequence[str] = ()) -> Result:
+def act(
+    exam: Exam,
+    calls: Calls,
+    env: PoolEnv,
+    mode: str,
+    twins: Sequence[str] = (),
+    recorder: Recorder | None = None,
+) -> Result:
     """Let a model act in one scenario, from its start to the end of the episode.
 
     Args:
@@ -163,12 +179,18 @@ def act(exam: Exam, calls: Calls, env: PoolEnv, mode: str, twins: Sequence[str] 
         mode: one of `MODES`.
         twins: ids of training scenarios in which the model may try first; it remembers these trials, and they do not
             count.
+        recorder: writes the line of the episode that counts.
     """
     trials = Trials(len(twins))
     for twin in twins:
         about = {**exam.about, "trial": len(trials.told) + 1}
         trials.told.append(_play(Episode(env, exam, mode, trials, _start(env, twin)), about, calls).told)
-    episode = _play(Episode(env, exam, mode, trials, _start(env, exam.row.id)), exam.about, calls)
+    start = _start(env, exam.row.id)
+    if recorder:
+        recorder.begin(env, start)
+    episode = _play(Episode(env, exam, mode, trials, start), exam.about, calls)
+    if recorder:
+        recorder.end(env, episode.end)
     explored = {"explored": trials.told} if twins else {}
     return Result(exam.about, ACT, len(episode.steps), "", {**episode.told, **explored})
 

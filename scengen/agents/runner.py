@@ -15,6 +15,7 @@ from ..control.teleop import TELEOP
 from ..envs.gym import PoolEnv
 from ..envs.observations import cameras_of
 from ..errors import BadConfig, UnknownName, cut
+from ..evaluate.recorder import Player, Recorder
 from ..perturb.language import Words
 from ..perturb.perturbation import Perturbation
 from ..pool import Pool, PoolRow, collection
@@ -42,6 +43,8 @@ STAGES = (UNDERSTAND, PLAN, ACT)
 """Numbers of the stages."""
 SETTINGS = "settings.json"
 """Name of the file with the settings of the last run in a folder."""
+LINES = "lines"
+"""Name of the folder of the lines of stage 3, with a folder for each task."""
 MAX_REFUSED = 3
 """Number of scenarios one after the other whose requests a model refuses, after which a run ends."""
 TRANSCRIPT = "transcript:"
@@ -235,11 +238,15 @@ def run(
         write(folder / SETTINGS, json.dumps(asdict(settings), indent=1) + "\n")
         results, stopped, total = list[dict[str, Any]](), "", len(todo) * len(settings.temperatures)
         refused, in_a_row, perturbed = list[str](), 0, {"perturbation": str(settings.perturbation)}
+        recorders = dict[str, Recorder]()
         try:
             for work, exam, env in exams(settings, todo, ask, search):
+                recorder = _recorder(settings, work, env, recorders, search)
                 try:
-                    found = _stages(settings, exam, calls, env, twins(settings, todo, work))
+                    found = _stages(settings, exam, calls, env, twins(settings, todo, work), recorder)
                 except RefusedRequest as error:
+                    if recorder:
+                        recorder.discard()
                     refused, in_a_row = [*refused, str(error)], in_a_row + 1
                     if in_a_row == MAX_REFUSED:
                         raise
@@ -251,6 +258,10 @@ def run(
                 progress(sum(r["stage"] == settings.stage for r in results), total)
         except OutOfBudget as error:
             stopped = str(error)
+        finally:
+            for recorder in recorders.values():
+                recorder.discard()
+                recorder.close()
         write(folder / f"results-{settings.stage}.jsonl", "".join(json.dumps(r) + "\n" for r in results))
         tasks = {work.task.name: work.task for work in todo} if settings.stage != ACT else {}
         known = {name: priors(task, facts.load(task, search)) for name, task in tasks.items()}
@@ -276,10 +287,25 @@ def twins(settings: AgentSettings, todo: Sequence[Work], work: Work) -> list[str
     return [other.id for other in others[: settings.explore]]
 
 
-def _stages(settings: AgentSettings, exam: Exam, calls: Calls, env: PoolEnv, trials: Sequence[str]) -> list[Result]:
+def _recorder(
+    settings: AgentSettings, work: Work, env: PoolEnv, known: dict[str, Recorder], search: Sequence[str]
+) -> Recorder | None:
+    """The recorder of the episodes of a task, which a stage without episodes has not. All are played again by each run,
+    from the journal as far as it goes."""
+    if settings.stage != ACT:
+        return None
+    if (name := work.task.name) not in known:
+        harness = f"scengen agent stage={ACT} mode={settings.mode} explore={settings.explore}"
+        known[name] = Recorder(settings.folder / LINES / name, Player(harness, settings.model), env, search, True)
+    return known[name]
+
+
+def _stages(
+    settings: AgentSettings, exam: Exam, calls: Calls, env: PoolEnv, trials: Sequence[str], recorder: Recorder | None
+) -> list[Result]:
     """Results of the stage, and of stage 1 before stage 2."""
     if settings.stage == ACT:
-        return [act(exam, calls, env, settings.mode, trials)]
+        return [act(exam, calls, env, settings.mode, trials, recorder)]
     artefact, first = understand(exam, calls)
     return [first] if settings.stage == UNDERSTAND else [first, make_plan(exam, artefact, calls)]
 

@@ -229,6 +229,11 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             return _revived, (type(self), self._arguments, self._progress())
 
     @property
+    def arguments(self) -> Mapping[str, Any]:
+        """Arguments of `__init__`, with the folders of pools by their absolute paths."""
+        return dict(self._arguments)
+
+    @property
     def streams(self) -> Mapping[str, Stream]:
         """Streams of the observation, by name."""
         return self.observed.streams
@@ -237,6 +242,10 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def cameras(self) -> tuple[str, ...]:
         """The paper's names of the cameras of the observation."""
         return tuple(self.observed.cameras)
+
+    def check_observations(self, names: Sequence[str]) -> None:
+        """Raise `UnknownName` for the first name that is neither a stream nor a camera of the environment."""
+        _requested(names, self.task, self._rows, lambda: self.scenario.orientation)
 
     @property
     def task_description(self) -> str:

@@ -175,6 +175,8 @@ class _Audit:
         """The rollouts of the table."""
         if isinstance(self.told, ThresholdSettings):
             return self._searched(self.told)
+        if self.told.harness:
+            return {*map(id_of, self.lines)}
         about = {key: told for key, told in self._chosen.items() if key[1] not in self.lost}
         return wanted(about, self.told) | wanted(about, self.told, self.stored.arms)
 
@@ -341,6 +343,8 @@ class _Audit:
             f"that {cut(self.told.name)} chose the actions, from what it is said to have perceived ({perceived}), "
             "and whether it read the instruction"
         )
+        if self.told.harness:
+            report.claimed.append(f"that {cut(self.told.harness)} played no other episodes")
         report.claimed.append("that the pools are sound (scengen verify pool=)")
 
     @property

@@ -81,14 +81,15 @@ class PolicyPlayer:
             ForeignCode: a policy crashed in the first batch.
         """
         envs, policies = self._prepared_for(batch[0].task, batch[0].perturbation)
-        rollouts = [_Rollout(*each) for each in zip(batch, envs.envs, policies, strict=False)]
+        places = zip(batch, envs.envs, policies, strict=False)
+        rollouts = [_PlayedRollout(which, env, policy=policy) for which, env, policy in places]
         for rollout in rollouts:
             rollout.instruct(self.search)
         self._play(envs, rollouts)
         self.strict = False
         return [rollout.record for rollout in rollouts]
 
-    def _play(self, envs: PoolVectorEnv, rollouts: "Sequence[_Rollout]") -> None:
+    def _play(self, envs: PoolVectorEnv, rollouts: "Sequence[_PlayedRollout]") -> None:
         """Play rollouts in the first slots."""
         count, size = envs.action_space.shape or (0, 0)
         names = [rollouts[min(slot, len(rollouts) - 1)].which.scenario for slot in range(count)]
@@ -113,7 +114,7 @@ class PolicyPlayer:
                         rollout.record["played"] = rollout.env.played
 
     def _actions(
-        self, rollouts: "Sequence[_Rollout]", observations: Sequence[Observation]
+        self, rollouts: "Sequence[_PlayedRollout]", observations: Sequence[Observation]
     ) -> list[NDArray[np.float64] | None]:
         """The next action in each rollout; None if its policy crashes, which ends it."""
         policies, together = [one.policy for one in rollouts], getattr(rollouts[0].policy, "act_all", None)
@@ -128,10 +129,10 @@ class PolicyPlayer:
             raise BadPolicy(f"policy {self.settings.name}: {told}")
         return [None] * len(rollouts) if found is None else [*found]
 
-    def _tried(self, rollouts: "Sequence[_Rollout]", part: str, call: Callable[[], A]) -> A | None:
+    def _tried(self, rollouts: "Sequence[_PlayedRollout]", part: str, call: Callable[[], A]) -> A | None:
         """Return value of a part of a policy; None if it crashes, which ends its rollouts."""
         try:
-            with policy_errors(self.settings.name, part):
+            with policy_errors(self.settings.name, part, rollouts[0].env):
                 return call()
         except ForeignCode as error:
             if self.strict:
@@ -140,7 +141,7 @@ class PolicyPlayer:
                 rollout.end(False, "", crashed=str(error))
             return None
 
-    def _checked(self, rollout: "_Rollout", action: NDArray[np.float64], size: int) -> NDArray[np.float32]:
+    def _checked(self, rollout: "_PlayedRollout", action: NDArray[np.float64], size: int) -> NDArray[np.float32]:
         try:
             return checked(action, size)
         except ValueError as error:
@@ -259,21 +260,17 @@ def policy_seed(scenario: str, rollout: int) -> int:
 
 
 @dataclass
-class _Rollout:
-    """A rollout in a slot."""
+class Rollout:
+    """A rollout in an environment, by a policy or by another program."""
 
     which: RolloutId
+    """The rollout."""
     env: PoolEnv
-    policy: Policy
+    """The environment."""
     record: dict[str, Any] = field(default_factory=dict)
     """Data that are known only at the end of the episode; empty before."""
     start: dict[str, Any] = field(default_factory=dict)
     """What is known of its start, see `first_look`."""
-
-    def instruct(self, search: Sequence[str]) -> None:
-        """Give the instruction of the arm."""
-        rows, arm = self.env._rows, self.which.arm
-        self.env.instruct(instruction(arm, rows[rows.find(self.which.scenario)], search) if arm != CLEAN else None)
 
     def begin(self, seen: Observation) -> Observation:
         """Note the start. Returns what the policy sees of the first observation."""
@@ -290,11 +287,6 @@ class _Rollout:
         """Seed of the policy's random numbers."""
         return policy_seed(self.which.scenario, self.which.rollout)
 
-    @property
-    def where(self) -> str:
-        """The scenario, for errors."""
-        return f"on scenario {self.env.row.name}"
-
     def end(self, success: bool, reason: str, lacks: str = "", crashed: str = "") -> None:
         """Write its record."""
         world, played = self.env.world, self.env.played
@@ -302,6 +294,23 @@ class _Rollout:
         ran = {"seconds": round(world.time, 3), "actions": len(played), "actions_sha256": sha256(played.tobytes())}
         read = {"instruction_read": self.env.instruction_read, "policy_seed": self.seed, "final_state": world.digest}
         self.record = {**asdict(self.which), **self.start, **told, **ran, **read}
+
+
+@dataclass
+class _PlayedRollout(Rollout):
+    """A rollout of a policy in a slot."""
+
+    policy: Policy = field(kw_only=True)
+
+    def instruct(self, search: Sequence[str]) -> None:
+        """Give the instruction of the arm."""
+        rows, arm = self.env._rows, self.which.arm
+        self.env.instruct(instruction(arm, rows[rows.find(self.which.scenario)], search) if arm != CLEAN else None)
+
+    @property
+    def where(self) -> str:
+        """The scenario, for errors."""
+        return f"on scenario {self.env.row.name}"
 
 
 def _of_slot(seen: Mapping[str, Any], slot: int) -> Observation:

@@ -4,14 +4,17 @@ A policy is any object with the two methods of `Policy` that `factory(env)` retu
 `module:factory` and called for every slot in every process and for every task. A policy may have a static method
 `act_all(policies, observations)` that returns the actions of several of them, in their order: a network computes those
 of all slots at once.
+
+A factory may declare what its policies need, as attributes (of a class, class attributes): see `Needs`.
 """
 
 import hashlib
 import inspect
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -48,6 +51,45 @@ class Policy(Protocol):
 
 
 Factory = Callable[[PoolEnv], Policy]
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a factory declares of its policies. An evaluation follows, unless its settings say otherwise."""
+
+    observations: tuple[str, ...] | None = None
+    """Names of the streams and cameras that the policy reads; None if it does not say."""
+    action_repeat: int | None = None
+    """Number of control periods for which each action is held; None if it does not say."""
+    language: bool | None = None
+    """Whether the policy reads `env.task_description`; None if it does not say."""
+
+    @classmethod
+    def of(cls, name: str, factory: Any) -> "Needs":
+        """What the factory of a policy declares.
+
+        Raises:
+            BadConfig: a declaration is of another type.
+        """
+        told = {f.name: getattr(factory, f.name, None) for f in fields(cls)}
+        names = told["observations"]
+        if names is not None:
+            is_list = isinstance(names, Sequence) and not isinstance(names, str)
+            if not is_list or not all(isinstance(each, str) for each in names):
+                raise _misdeclared(name, "observations", names, "a list of names of streams and cameras")
+            told["observations"] = tuple(names)
+        for key, kind, what in (("action_repeat", int, "a whole number"), ("language", bool, "true or false")):
+            if told[key] is not None and type(told[key]) is not kind:
+                raise _misdeclared(name, key, told[key], what)
+        return cls(**told)
+
+    def missing(self, observed: Iterable[str]) -> list[str]:
+        """Names that the policy reads and that are not among those that are observed."""
+        return [each for each in self.observations or () if each not in {*observed}]
+
+
+def _misdeclared(name: str, key: str, given: Any, what: str) -> BadConfig:
+    return BadConfig(f"policy = {cut(name)}; its {key} = {cut(repr(given), 60)} must be {what}")
 
 
 class Idle:
@@ -192,7 +234,7 @@ def make_policy(name: str, factory: Factory, env: PoolEnv) -> Policy:
         ForeignCode: the factory raises an error.
         BadConfig: the returned object is not a policy.
     """
-    with policy_errors(name, "its factory"):
+    with policy_errors(name, "its factory", env):
         policy = factory(env)
     if missing := [method for method in ("reset", "act") if not callable(getattr(policy, method, None))]:
         what = f"returned {type(policy).__name__}, which has no method {' and no '.join(missing)}"
@@ -203,18 +245,43 @@ def make_policy(name: str, factory: Factory, env: PoolEnv) -> Policy:
 
 
 @contextmanager
-def policy_errors(name: str, part: str) -> Iterator[None]:
+def policy_errors(name: str, part: str, env: PoolEnv | None = None) -> Iterator[None]:
     """Attribute an error to the policy unless scengen raises it on purpose.
 
+    Args:
+        env: environment of the policy.
+
     Raises:
-        ForeignCode: an error that is not a `ScengenError`.
+        BadConfig: the policy reads a stream or a camera that it is not given.
+        ForeignCode: another error that is not a `ScengenError`.
     """
     try:
         yield
     except ScengenError:
         raise
+    except KeyError as error:
+        if env is not None and error.args and (known := _unobserved(error.args[0], env)):
+            raise BadConfig(unobserved(name, [known], [*env.streams, *env.cameras])) from None
+        raise at_fault("policy", name, f"{part} fails", error) from error
     except Exception as error:
         raise at_fault("policy", name, f"{part} fails", error) from error
+
+
+def unobserved(name: str, missing: Sequence[str], observed: Sequence[str]) -> str:
+    """A line about streams and cameras that a policy reads but is not given, with the setting that adds them."""
+    whole = ",".join([*observed, *missing])
+    return f"{cut(name)} reads {', '.join(missing)}, which is not observed; pass observations=[{whole}]"
+
+
+def _unobserved(key: Any, env: PoolEnv) -> str:
+    """The key if it is the name of a stream or a camera that is not observed; else an empty text."""
+    if not isinstance(key, str) or key in (*env.streams, *env.cameras):
+        return ""
+    try:
+        env.check_observations([key])
+    except UnknownName:
+        return ""
+    return key
 
 
 def identity(name: str, factory: Factory, policy: Policy) -> str:

@@ -130,19 +130,50 @@ def opened(
             _move_aside(path)
         whole = {**depends, "task_versions": task_versions, **described}
         with Log(path, whole, remedy, settings.folder / RUN) as log:
-            yield Run(settings, player, about, log, keep, progress)
+            yield Run(settings, about, log, player, keep, progress)
 
 
 @dataclass
-class Run:
-    """A run whose log is open."""
+class LineLog:
+    """Lines of episodes, in a log that is open."""
 
     settings: EvaluateSettings
-    player: PolicyPlayer
+    """Settings of the evaluation."""
     about: Scenarios
+    """What lines say of the scenarios."""
     log: Log
+    """The log."""
+
+    def add(self, record: dict[str, Any]) -> None:
+        """Store the line of an episode."""
+        told = told_of(id_of(record), self.about[record["pool"], record["scenario"]])
+        made = {"policy": self.settings.name, "instruction_sha256": sha256(record["instruction"])}
+        line = {"episode": len(self.log.records), **record, **told, **made, **here()}
+        line = {name: line[name] for name in COLUMNS if name != CHAIN}
+        self.log.add({**line, CHAIN: chained(self.chain, line)})
+
+    @property
+    def chain(self) -> str:
+        """Hash at the end of the log."""
+        return self.log.records[-1][CHAIN] if self.log.records else run_sha256(self.log.identity)
+
+    def sort(self) -> None:
+        """Bring the lines into an order that does not depend on when they were played."""
+        there = sorted(self.log.records, key=order)
+        if there != self.log.records:
+            self.log.replace(renewed(self.log.identity, there))
+
+
+@dataclass
+class Run(LineLog):
+    """A run of a policy."""
+
+    player: PolicyPlayer
+    """Plays the rollouts."""
     keep: Keep
+    """Keeps their actions."""
     progress: Callable[[int, int], None]
+    """Called with the number of rollouts done, and their total."""
     earlier: int = 0
     """Number of episodes that an earlier run played."""
     wanted: set[RolloutId] = field(default_factory=set)
@@ -162,7 +193,7 @@ class Run:
             played = record.pop("played", None)
             if played is not None:
                 self.keep(id_of(record), played)
-            self._add(record)
+            self.add(record)
             self.progress(count, len(some))
 
     def extend(self, settings: EvaluateSettings) -> None:
@@ -175,30 +206,11 @@ class Run:
         """The lines of all rollouts of the run."""
         return [line for line in self.log.records if id_of(line) in self.wanted]
 
-    @property
-    def chain(self) -> str:
-        """Hash at the end of the log."""
-        return self.log.records[-1][CHAIN] if self.log.records else run_sha256(self.log.identity)
-
-    def sort(self) -> None:
-        """Bring the lines into an order that does not depend on when they were played."""
-        there = sorted(self.log.records, key=order)
-        if there != self.log.records:
-            self.log.replace(renewed(self.log.identity, there))
-
     def arms(self) -> list[str]:
         """The chosen arms; by default those of the inputs that the policy has."""
         if self.settings.chosen_arms is not None:
             return self.settings.chosen_arms
         return automatic_arms(self.lines())
-
-    def _add(self, record: dict[str, Any]) -> None:
-        """Store the line of an episode."""
-        told = told_of(id_of(record), self.about[record["pool"], record["scenario"]])
-        made = {"policy": self.settings.name, "instruction_sha256": sha256(record["instruction"])}
-        line = {"episode": len(self.log.records), **record, **told, **made, **here()}
-        line = {name: line[name] for name in COLUMNS if name != CHAIN}
-        self.log.add({**line, CHAIN: chained(self.chain, line)})
 
 
 @cache
@@ -240,7 +252,7 @@ def _played(player: PolicyPlayer, todo: Sequence[RolloutId]) -> Iterator[dict[st
 
     def lost(batch: Sequence[RolloutId], reason: str) -> list[dict[str, Any]]:
         if len(batch) == 1:
-            return [_crashed(batch[0], reason)]
+            return [crashed_record(batch[0], f"the process {reason}")]
         alone.extend([which] for which in batch)
         return []
 
@@ -262,10 +274,10 @@ def id_of(line: Mapping[str, Any]) -> RolloutId:
     return RolloutId(**{f.name: line[f.name] for f in fields(RolloutId)})
 
 
-def _crashed(which: RolloutId, reason: str) -> dict[str, Any]:
-    """The record of a rollout whose process died twice."""
+def crashed_record(which: RolloutId, reason: str) -> dict[str, Any]:
+    """The record of a rollout of which nothing but its start is known, such as one whose process died twice."""
     unknown = dict.fromkeys(("instruction", "first_state", "renderer", "reason", "lacks", "phase"), "")
-    unknown |= {"actions_sha256": "", "final_state": "", "crashed": f"the process {reason}"}
+    unknown |= {"actions_sha256": "", "final_state": "", "crashed": reason}
     nothing = {"perturb": {}, "pictures": {}, "instruction_read": False, "success": False, "seconds": 0.0, "actions": 0}
     return {**asdict(which), **unknown, **nothing, "policy_seed": policy_seed(which.scenario, which.rollout)}
 
@@ -274,6 +286,8 @@ def identity(settings: EvaluateSettings, pools: Sequence[Pool]) -> dict[str, Any
     """Everything on which the outcome of a rollout depends. More scenarios, rollouts or conditions continue a run."""
     names = ("policy", "version", "observations", "width", "height", "action_filter", "action_repeat", "rules", "look")
     chosen = {"format": FORMAT, **{name: getattr(settings, name) for name in (*names, "perturb_seed")}}
+    if settings.harness:
+        chosen["harness"] = settings.harness
     chosen["look_version"] = look_named(settings.look).version
     if settings.remote:
         chosen["client"] = settings.remote.identity()

@@ -68,9 +68,9 @@ def rows(
         lines: lines of its table.
         clean: its episodes under no condition.
     """
-    for what in dict.fromkeys(line.what for line in lines):
+    for what in dict.fromkeys([*(line.what for line in lines), *(one.task for one in conditions)]):
         own = [line for line in lines if line.what == what]
-        if own[0].id is not None:
+        if own and own[0].id is not None:
             yield Row(what, ID, "", policy, own[0].id, None, *_counts(clean, what, ID))
         for line in own:
             if line.ood is not None:

@@ -18,11 +18,11 @@ from ..perturb.perturbation import NONE as NO_PERTURBATION
 from ..perturb.perturbation import Perturbation
 from ..pool import collection
 from ..sim.embodiment import JAW
-from ..work.foreign import is_factory
+from ..work.foreign import factory_of, is_factory
 from ..work.limits import at_least
 from ..work.parallel import Workers
 from .arms import AUTO, CLEAN, NONE, check_arms
-from .policies import FULL_RATE_POLICIES
+from .policies import FULL_RATE_POLICIES, Needs, unobserved
 from .remote.client import INSTRUCTION, ClientSettings, address_of, is_address, read_client
 
 ALL = "all"
@@ -45,7 +45,10 @@ MAX_FOLDER_NAME = 100
 
 @dataclass(frozen=True)
 class EvaluateSettings:
-    """Settings of `scengen evaluate`; conf/command/evaluate.yaml explains them."""
+    """Settings of `scengen evaluate`; conf/command/evaluate.yaml explains them.
+
+    `benign` holds the pools of that arm, and `harness` the name of the program that played the episodes instead.
+    """
 
     policy: str | list[str] = ""
     pool: str | list[str] | None = None
@@ -74,6 +77,7 @@ class EvaluateSettings:
     arms: str | list[str] = AUTO
     format: list[str] = field(default_factory=list)
     benign: list[str] = field(default_factory=list)
+    harness: str | None = None
 
     @cached_property
     def folders(self) -> list[str]:
@@ -147,6 +151,11 @@ class EvaluateSettings:
         return read_client(self.client, address_of(self.name)) if is_address(self.name) else None
 
     @property
+    def needs(self) -> Needs:
+        """What the code of the policy declares; nothing for other policies."""
+        return Needs.of(self.name, factory_of("policy", self.name)) if is_factory(self.name) else Needs()
+
+    @property
     def _gets_text(self) -> bool:
         """Whether the policy may read the instruction: code of its own may, a server if its client file names it."""
         if self.remote:
@@ -162,8 +171,13 @@ class EvaluateSettings:
                 f"tasks = {cut(str(self.tasks))}; it chooses sets of an edition: pass edition=v1 without pool="
             )
 
+    def check_no_text(self) -> None:
+        """Raise `BadConfig` if a perturbation changes the instruction, for a policy that does not read it."""
+        if texts := [p for p in self.perturbations if Perturbation.parse(p).has_words]:
+            raise BadConfig(f"perturb = {texts[0]}; policy {self.name} gets no text: leave out what changes the text")
+
     def check(self) -> None:
-        """Raise `ScengenError` if a setting is not valid."""
+        """Raise `ScengenError` if a setting is not valid. Nothing is imported: they may be of unknown origin."""
         check_filter(self.action_filter)
         check_rules(self.rules)
         check_arms(self.chosen_arms or ())
@@ -171,8 +185,8 @@ class EvaluateSettings:
         for name in self.format:
             if name not in (LATEX, PROFILE):
                 raise UnknownName("format", name, (LATEX, PROFILE))
-        if not self._gets_text and (texts := [p for p in self.perturbations if Perturbation.parse(p).has_words]):
-            raise BadConfig(f"perturb = {texts[0]}; policy {self.name} gets no text: leave out what changes the text")
+        if not self._gets_text and not self.harness:
+            self.check_no_text()
         look_named(self.look)
         if self.splits not in SPLITS:
             raise UnknownName("splits", self.splits, SPLITS)
@@ -234,12 +248,24 @@ class RolloutId:
 
 
 def completed(settings: T) -> T:
-    """Settings with the observations and the rate of a policy that names them, unless they were chosen."""
-    if not is_policy(settings.name):
-        return settings
-    own = read_settings(settings.name)
-    repeat = own.action_repeat if settings.action_repeat == 1 else settings.action_repeat
-    return replace(settings, observations=settings.observations or list(own.observed), action_repeat=repeat)
+    """Settings with the observations and the rate that a policy brings or declares, unless they were chosen.
+
+    Raises:
+        BadConfig: the chosen observations lack one that the policy declares, or a perturbation changes a text that it
+            does not read.
+    """
+    if is_policy(settings.name):
+        own = read_settings(settings.name)
+        needs = Needs(tuple(own.observed), own.action_repeat)
+    else:
+        needs = settings.needs
+        if settings.observations and (missing := needs.missing(settings.observations)):
+            raise BadConfig(unobserved(settings.name, missing, settings.observations))
+        if needs.language is False:
+            settings.check_no_text()
+    observations = settings.observations or (None if needs.observations is None else list(needs.observations))
+    repeat = settings.action_repeat if settings.action_repeat != 1 else needs.action_repeat or 1
+    return replace(settings, observations=observations, action_repeat=repeat)
 
 
 def other_version(settings: EvaluateSettings, search: Sequence[str] = ()) -> str:

@@ -47,6 +47,7 @@ class StoredRun:
     client: Mapping[str, Any] | None = None
     settle: bool = True
     keep: list[str] = field(default_factory=list)
+    harness: str | None = None
     threshold: Mapping[str, Any] = field(default_factory=dict)
     """Settings that decide which rollouts a search for a threshold plays; empty for an evaluation."""
 
@@ -102,7 +103,7 @@ class StoredResult:
         found = typed(str(path), cls, {f.name: plain[f.name] for f in fields(cls) if f.name in plain})
         if found.folder != "." and found.folder not in {each.name for each in path.parent.iterdir()}:
             raise BadConfig(
-                f"{path} needs the folder {cut(found.folder)!a} beside it, and it is missing; "
+                f"{path} needs the folder {cut(found.folder)!a} next to it, and it is missing; "
                 "give a folder of scengen evaluate"
             )
         return found

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from helpers import REFERENCE, certified_here
 
+from scengen import cli
 from scengen.agents import runner
 from scengen.agents.models import Call, Reply
 from scengen.agents.primitives import BadCall, primitive, tools
 from scengen.agents.runner import AgentSettings, run
 from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig
+from scengen.evaluate.lines import read_lines
 from scengen.perturb.language import Words
 
 BASE = Path(__file__).parents[1] / "checker" / "base"
@@ -45,6 +47,17 @@ class Scripted:
 def test_a_list_written_by_hand_from_the_poses_topples_every_chain(tmp_path, monkeypatch):
     found = played(tmp_path, monkeypatch, by_hand.Domino(), seeds=5)
     assert sum(result["grades"]["right"] for result in found) >= 3, [r["grades"]["reason"] for r in found]
+
+
+def test_the_episodes_that_count_have_lines_that_verify(tmp_path, monkeypatch):
+    changes = {"seeds": 2, "explore": 1, "temperatures": [0.0, 1.0]}
+    for _ in range(2):  # the lines of a run that is repeated are written again
+        played(tmp_path, monkeypatch, Scripted(), **changes)
+        folder = tmp_path / "lines" / "domino_single"
+        lines = read_lines(folder / "episodes.jsonl")
+        assert [line["rollout"] for line in lines] == [0, 1, 0, 1] and all(line["instruction_read"] for line in lines)
+        assert {line["reason"] for line in lines} == {"the model says that it is done"}
+    assert cli.run(["verify", f"results={folder}", "level=full"]) == 0
 
 
 @pytest.mark.parametrize(

@@ -210,7 +210,7 @@ def test_a_table_about_other_episodes_than_those_beside_it_is_refused(results, t
     folder = forged(results, tmp_path, "bare", lines_of(results / "bare"), False)
     for elsewhere in (str(results / "bare"), "../other", "there/../..", "nowhere"):
         edit(folder, TABLE, folder=elsewhere)
-        with pytest.raises(BadConfig, match="beside it, and it is missing"):
+        with pytest.raises(BadConfig, match="next to it, and it is missing"):
             verdict(folder, ONE)
 
 

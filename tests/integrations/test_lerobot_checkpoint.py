@@ -112,5 +112,8 @@ def test_what_it_needs_is_asked_for_in_one_line(checkpoint, monkeypatch, tmp_pat
     with pytest.raises(BadConfig, match=r"has no config\.json"):
         policy(env)
     monkeypatch.setenv("LEROBOT_CHECKPOINT", str(checkpoint))
-    with pytest.raises(BadConfig, match=r"reads observation\.environment_state, which the environment does not give"):
+    with pytest.raises(
+        BadConfig,
+        match=r"reads object-state, which is not observed; pass observations=\[robot0_eef_pos,.*,object-state\]",
+    ):
         policy(env)

@@ -4,7 +4,7 @@ Each split of the pools is a suite, so that one call of lerobot-eval reports suc
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
@@ -18,6 +18,7 @@ from scengen.envs.object_state import NAME
 from scengen.envs.observations import ALL, cameras_of, proprioception
 from scengen.envs.pools import rows_of
 from scengen.errors import BadConfig
+from scengen.evaluate.recorder import Player, RecordedEpisodes, Recorder
 from scengen.perturb.perturbation import Perturbation
 
 
@@ -80,6 +81,12 @@ class ScengenEnv(EnvConfig):
     """Kinds of perturbation at their levels, such as `light_direction@3+noise@1`. The names of suites hold them."""
     perturb_seed: int = 0
     """Another number draws other perturbations for the same scenarios."""
+    lines: str = ""
+    """Folder for lines as those of `scengen evaluate`, which `scengen verify results=` rebuilds; default: none."""
+    policy_name: str = "policy"
+    """Name of the policy in the lines."""
+
+    _recorder: ClassVar[Recorder | None] = None
 
     def __post_init__(self) -> None:
         """Describe the observations, which depend on the pools.
@@ -132,6 +139,11 @@ class ScengenEnv(EnvConfig):
         """
         if not self.pool:
             raise BadConfig("no pool was given; give --env.pool=FOLDER, which scengen generate makes")
+        if self.lines and use_async_envs and n_envs > 1:
+            raise BadConfig("one process writes lines; give --eval.use_async_envs=false, or leave --env.lines out")
+        if self.lines:
+            first = PoolEnv(str(self.task), **self.gym_kwargs)
+            self._recorder = Recorder(self.lines, Player("lerobot-eval", self.policy_name), first)
         found: dict[str, dict[int, VectorEnv]] = {}
         for split in self._splits():
             makers = [lambda split=split, slot=slot: self._environment(split, slot) for slot in range(n_envs)]
@@ -144,7 +156,10 @@ class ScengenEnv(EnvConfig):
         return found
 
     def _environment(self, split: str, slot: int) -> gymnasium.Env:
-        return EachOnce(LeRobotNames(PoolEnv(str(self.task), split=split, **self.gym_kwargs)), slot)
+        env: gymnasium.Env = PoolEnv(str(self.task), split=split, **self.gym_kwargs)
+        if self._recorder:
+            env = RecordedEpisodes(env, self._recorder)
+        return EachOnce(LeRobotNames(env), slot)
 
     def _splits(self) -> list[str]:
         return self._listed(self.split) or sorted(rows_of(self._listed(self.pool), str(self.task)).kinds("split"))

@@ -15,11 +15,15 @@ import torch
 from lerobot.configs import PreTrainedConfig
 from lerobot.envs.utils import preprocess_observation
 from lerobot.policies.factory import get_policy_class, make_pre_post_processors
+from lerobot.utils.constants import OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 from numpy.typing import NDArray
 
 from scengen.envs.gym import Observation, PoolEnv
 from scengen.envs.lerobot import LeRobotNames
+from scengen.envs.object_state import NAME
+from scengen.envs.observations import proprioception
 from scengen.errors import BadConfig
+from scengen.evaluate.policies import unobserved
 
 VARIABLE = "LEROBOT_CHECKPOINT"
 """Environment variable with the folder of the checkpoint: the one that has config.json and model.safetensors."""
@@ -42,10 +46,9 @@ class Checkpoint:
         self._env, self._names = env, LeRobotNames(env)
         given = self._batch({name: space.sample() for name, space in env.observation_space.spaces.items()})
         if missing := sorted(config.input_features.keys() - given.keys()):
-            raise BadConfig(
-                f"the checkpoint reads {', '.join(missing)}, which the environment does not give; set observations= to "
-                "the streams and cameras of its data"
-            )
+            ours = {OBS_ENV_STATE: [NAME], OBS_STATE: [*proprioception(env.task.embodiment)]}
+            streams = [name for key in missing for name in ours.get(key, [key.removeprefix(f"{OBS_IMAGES}.")])]
+            raise BadConfig(unobserved("the checkpoint", streams, [*env.streams, *env.cameras]))
         self._policy = get_policy_class(config.type).from_pretrained(folder, config=config)
         device = {"device_processor": {"device": config.device}}
         self._before, self._after = make_pre_post_processors(config, str(folder), preprocessor_overrides=device)

@@ -19,6 +19,7 @@ from robomimic.utils.obs_utils import process_obs
 from scengen.envs.gym import Observation, PoolEnv
 from scengen.envs.robomimic import names
 from scengen.errors import BadConfig
+from scengen.evaluate.policies import unobserved
 
 VARIABLE = "ROBOMIMIC_CHECKPOINT"
 """Environment variable with the checkpoint, a file that ends in .pth."""
@@ -39,10 +40,7 @@ class Checkpoint:
         own, given = names(env.task.embodiment), env.observation_space.spaces
         read = list(stored["shape_metadata"]["all_obs_keys"])
         if missing := [own.get(key, key) for key in read if own.get(key) not in given]:
-            raise BadConfig(
-                f"the checkpoint reads {', '.join(missing)}, which the environment does not give; set observations= to "
-                "the streams and cameras of its data"
-            )
+            raise BadConfig(unobserved("the checkpoint", missing, [*given]))
         self._names = {key: own[key] for key in read}
         self.identity = hashlib.sha256(file.read_bytes()).hexdigest()
 

@@ -70,7 +70,12 @@ def command(arguments: Arguments) -> int:
         for path, content in plots(results, settings.folder).items():
             write(path, content)
     incomplete = [_report(result, pools) for result in results]
-    say(f"wrote {settings.folder}: table.md, table.json, episodes.jsonl, episodes.csv")
+    lines = [f"wrote {one.folder}: episodes.jsonl, episodes.csv" for one in every] if len(every) > 1 else []
+    for told in (
+        *lines,
+        f"wrote {settings.folder}: table.md, table.json{'' if lines else ', episodes.jsonl, episodes.csv'}",
+    ):
+        say(told)
     return FAILED if any(incomplete) else OK
 
 

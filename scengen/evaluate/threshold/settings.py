@@ -9,13 +9,12 @@ from ...errors import BadConfig
 from ...work.limits import at_least
 from ..arms import NONE
 from ..settings import EvaluateSettings
+from .shift import MAX_LEVELS
 
 SEED = 7400
 """Seed of the draws: none that people take for training, and not that of editions or of the arm `benign`."""
 MAX_BUDGET = 10_000
 """Largest number of rollouts: pools for them are drawn in advance."""
-MAX_LEVELS = 100
-"""Largest number of levels of an axis."""
 
 
 @dataclass(frozen=True)

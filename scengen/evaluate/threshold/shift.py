@@ -23,6 +23,8 @@ from ...samplers.task import Task, load
 
 LEVELS = 5
 """Number of levels of an axis that has no severities."""
+MAX_LEVELS = 20
+"""Largest number of levels: the candidates of a search take 16 MB for so many."""
 TOLERANCE = 1e-9
 """Largest difference between the value of an axis in a pool and that of its level."""
 
@@ -53,6 +55,8 @@ class Shift:
         found = load_task(task, search)
         if along in found.axes:
             count = levels or found.axes[along].severities or LEVELS
+            if count > MAX_LEVELS:
+                raise BadConfig(f"axis {along} of {task} has {count} severities; pass levels={MAX_LEVELS} or fewer")
             return cls(_with_severities(found, along, count), along, count)
         if along not in kinds():
             raise UnknownName(f"along of {task}", along, [*found.axes, *kinds()])
