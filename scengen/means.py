@@ -91,6 +91,11 @@ class Watch:
         """What is found out about each mean so far: `OPEN`, `SHOWN` or `MISSED`."""
         return {name: float(self.world.shown[number]) for name, number in self._numbers.items()}
 
+    @property
+    def missed(self) -> str:
+        """Names of the means that were missed, joined by semicolons; empty if none was. A missed mean stays missed."""
+        return "; ".join(name for name, number in self._numbers.items() if self.world.shown[number] == MISSED)
+
     def lacking(self) -> str:
         """Names of the means that a success now lacks, joined by semicolons; empty for a success by the means."""
         return "; ".join(name for name, mean in self.means.items() if not self._has(name, mean))

@@ -30,10 +30,9 @@ from ..pool.untrusted import (
 )
 from ..samplers.task import Task
 from ..sim.world import World
-from ..validate.certify import lower_bound
 from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
-from ..validate.settings import Robust
+from ..validate.settings import Robust, lower_bound
 from ..work.machine import memory_bounded
 from ..work.plain import open_plain
 from ..work.targets import write

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from scipy.special import betaincinv
+
 from ..errors import BadConfig, cut
 
 
@@ -47,6 +49,20 @@ class CertifySettings:
             low, high, unit = BOUNDS[name]
             if not low <= value <= high:
                 raise BadConfig(f"certify.{name} = {cut(str(value))}; it must lie in [{low:g}, {high:g}]{unit}")
+        runs, best = self.robust.runs, lower_bound(self.robust.runs, self.robust.runs)
+        if best < self.robust.bound:
+            what = f"certify.robust.bound = {self.robust.bound:g} cannot be shown by certify.robust.runs = {runs}"
+            remedy = f"lower the bound, or ask for more runs ({QUICK.robust.runs} show {QUICK.robust.bound:g})"
+            raise BadConfig(f"{what}: if all succeed, it is {best:.3g}; {remedy}")
+
+
+CONFIDENCE = 0.95
+"""Confidence of the one-sided bound on the oracle's success rate."""
+
+
+def lower_bound(successes: int, runs: int) -> float:
+    """One-sided Clopper-Pearson lower bound of a success rate at 95 % confidence."""
+    return float(betaincinv(successes, runs - successes + 1, 1 - CONFIDENCE)) if successes else 0.0
 
 
 BOUNDS: dict[str, tuple[float, float, str]] = {
