@@ -78,14 +78,14 @@ class Watch:
             raise ValueError(f"a task has at most {MAX_MEANS} means, not {len(means)}")
         self.means, self.world = means, world
         self._numbers = {name: number for number, name in enumerate(means)}
+        self._order = [(number, mean, self._numbers.get(mean.after)) for number, mean in enumerate(means.values())]
 
     def update(self) -> None:
         """Judge the past control period."""
-        shown = self.world.shown
-        for name, mean in self.means.items():
-            number = self._numbers[name]
-            if shown[number] == OPEN and (not mean.after or shown[self._numbers[mean.after]] == SHOWN):
-                shown[number] = mean.found(self.world)
+        world, shown = self.world, self.world.shown
+        for number, mean, before in self._order:
+            if shown.item(number) == OPEN and (before is None or shown.item(before) == SHOWN):
+                shown[number] = mean.found(world)
 
     def found(self) -> dict[str, float]:
         """What is found out about each mean so far: `OPEN`, `SHOWN` or `MISSED`."""

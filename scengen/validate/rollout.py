@@ -127,7 +127,7 @@ class Jitter:
         shake = np.zeros((len(action) // ACTION, ACTION))
         for arm, channels in enumerate(shake):
             channels[:MOTION] = normals(MOTION, self.key, "action", period, arm)
-        return np.clip(action + self.noise * shake.ravel(), -1.0, 1.0)
+        return (action + self.noise * shake.ravel()).clip(-1.0, 1.0)
 
 
 def run(
