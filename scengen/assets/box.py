@@ -3,6 +3,7 @@
 import abc
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -46,11 +47,11 @@ class Domino(Box):
     friction: float = param(0.5, "1", 0.05, 1.5)
     rgba: Rgba = (0.90, 0.86, 0.76, 1.0)
 
-    @property
+    @cached_property
     def size(self) -> Vec3:
         return np.array([self.thickness, self.width, self.height])
 
-    @property
+    @cached_property
     def tipping_angle(self) -> float:
         """Tilt at which the centre of mass passes over the edge of the foot [rad]."""
         return math.atan2(self.thickness, self.height)
@@ -71,7 +72,7 @@ class Block(Box):
     """Sliding friction: rubber on painted wood has 0.7 to 0.9."""
     rgba: Rgba = (0.20, 0.36, 0.66, 1.0)
 
-    @property
+    @cached_property
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.height])
 
@@ -89,7 +90,7 @@ class Cube(Box):
     friction: float = param(0.5, "1", 0.05, 1.5, hidden=True)
     rgba: Rgba = (0.82, 0.20, 0.15, 1.0)
 
-    @property
+    @cached_property
     def size(self) -> Vec3:
         return np.array([self.edge] * 3)
 
@@ -114,26 +115,26 @@ class LoadedCube(Box):
     friction: float = param(0.45, "1", 0.05, 1.5, hidden=True)
     rgba: Rgba = (0.82, 0.20, 0.15, 1.0)
 
-    @property
+    @cached_property
     def size(self) -> Vec3:
         return np.array([self.edge] * 3)
 
-    @property
+    @cached_property
     def com(self) -> float:
         """Distance of the centre of mass from the middle, along x [m]."""
         return self.lean * self.edge
 
-    @property
+    @cached_property
     def slug(self) -> float:
         """Edge of the slug, which is a cube [m]."""
         return (SLUG_SHARE * self.mass / LEAD_DENSITY) ** (1 / 3)
 
-    @property
+    @cached_property
     def steepest(self) -> float:
         """Largest possible `lean`: the slug touches the side from inside."""
         return SLUG_SHARE * (self.edge - self.slug) / (2 * self.edge)
 
-    @property
+    @cached_property
     def inertia(self) -> Vec3:
         """Principal moments of inertia at the centre of mass, about x, y and z [kg m^2]."""
         foam, slug = (1 - SLUG_SHARE) * self.mass, SLUG_SHARE * self.mass
@@ -166,7 +167,7 @@ class Lid(Box):
     friction: float = param(0.3, "1", 0.05, 1.5)
     rgba: Rgba = (0.72, 0.70, 0.66, 1.0)
 
-    @property
+    @cached_property
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.thickness])
 

@@ -3,6 +3,7 @@
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -67,7 +68,7 @@ class Cup(Turned):
     """Whether the bead is a grip on its inside only, and the wall goes on outside of it. The family sets it."""
     rgba: Rgba = (0.80, 0.45, 0.32, 1.0)
 
-    @property
+    @cached_property
     def stance(self) -> tuple[float, float]:
         return self.base, self.floor
 
@@ -75,7 +76,7 @@ class Cup(Turned):
         """Outer radius at a height above the ground [m]."""
         return self.base + (self.rim - self.base) * height / self.height
 
-    @property
+    @cached_property
     def sections(self) -> list[Section]:
         top, end = self.height - RIM_HEIGHT, self.height
         flat = self.floor - FOOT_PROTRUSION
@@ -115,16 +116,16 @@ class Cup(Turned):
 
     # --- handle ---------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def has_handle(self) -> bool:
         return self.handle >= MIN_HANDLE
 
-    @property
+    @cached_property
     def grip(self) -> Vec3:
         """Middle of the handle's upright bar, in the cup's axes [m]."""
         return np.array([self._upright_distance, 0.0, (HANDLE_BOTTOM + HANDLE_TOP) / 2 * self.height])
 
-    @property
+    @cached_property
     def _upright_distance(self) -> float:
         """Distance of the upright bar's middle line from the cup's axis [m]."""
         return self.outer((HANDLE_BOTTOM + HANDLE_TOP) / 2 * self.height) + self.handle - self.bar / 2

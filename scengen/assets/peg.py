@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -25,11 +26,11 @@ class Peg(Box):
     friction: float = param(0.6, "1", 0.05, 1.5, hidden=True)
     rgba: Rgba = (0.80, 0.20, 0.15, 1.0)
 
-    @property
+    @cached_property
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.length])
 
-    @property
+    @cached_property
     def tipping_angle(self) -> float:
         """Tilt at which the centre of mass passes over an edge of the base [rad]."""
         return math.atan2(self.width, self.length)
@@ -45,7 +46,7 @@ class Plinth(Box):
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: Rgba = (0.45, 0.33, 0.22, 1.0)
 
-    @property
+    @cached_property
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.height])
 

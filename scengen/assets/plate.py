@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from ..params import param
 from .prop import Rgba, show
@@ -37,21 +38,21 @@ class Plate(Turned):
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: Rgba = (0.88, 0.86, 0.80, 1.0)
 
-    @property
+    @cached_property
     def stance(self) -> tuple[float, float]:
         return self.foot, self.thickness
 
-    @property
+    @cached_property
     def height(self) -> float:
         """Height of the lip's upper side above the ground [m]."""
         return self.rise + self.thickness
 
-    @property
+    @cached_property
     def pressed_tilt(self) -> float:
         """Tilt of the plate when its lip is pressed to the ground [rad]. It turns about the edge of its foot."""
         return math.atan2(self.rise, self.radius - self.foot)
 
-    @property
+    @cached_property
     def sections(self) -> list[Section]:
         hole = self.hole if self.hole >= MIN_DETAIL else 0.0
         lip = self.lip if self.lip >= MIN_DETAIL else 0.0
