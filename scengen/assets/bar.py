@@ -1,7 +1,6 @@
 """Bars and posts with a square base."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -19,6 +18,6 @@ class Bar(Cube):
     high: float = param(1.0, "1", 1.0, 3.0)
     """Height, in widths."""
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return self.edge * np.array([1.0, self.long, self.high])

@@ -89,11 +89,11 @@ class Bowl(Turned):
         """Height of the floor inside [m]."""
         return self._corner(self.inner / math.cos(self._band_angle / 2), self._foot_angle)[1]
 
-    @cached_property
+    @property
     def stance(self) -> tuple[float, float]:
         return self.foot, self.floor
 
-    @cached_property
+    @property
     def sections(self) -> list[Section]:
         angles = [self._foot_angle + i * self._band_angle for i in range(SHELL_BANDS + 1)]
         outside = [self._corner(self.outer, a) for a in angles]

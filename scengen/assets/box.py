@@ -47,7 +47,7 @@ class Domino(Box):
     friction: float = param(0.5, "1", 0.05, 1.5)
     rgba: Rgba = (0.90, 0.86, 0.76, 1.0)
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return np.array([self.thickness, self.width, self.height])
 
@@ -72,7 +72,7 @@ class Block(Box):
     """Sliding friction: rubber on painted wood has 0.7 to 0.9."""
     rgba: Rgba = (0.20, 0.36, 0.66, 1.0)
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.height])
 
@@ -90,7 +90,7 @@ class Cube(Box):
     friction: float = param(0.5, "1", 0.05, 1.5, hidden=True)
     rgba: Rgba = (0.82, 0.20, 0.15, 1.0)
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return np.array([self.edge] * 3)
 
@@ -115,7 +115,7 @@ class LoadedCube(Box):
     friction: float = param(0.45, "1", 0.05, 1.5, hidden=True)
     rgba: Rgba = (0.82, 0.20, 0.15, 1.0)
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return np.array([self.edge] * 3)
 
@@ -167,7 +167,7 @@ class Lid(Box):
     friction: float = param(0.3, "1", 0.05, 1.5)
     rgba: Rgba = (0.72, 0.70, 0.66, 1.0)
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.thickness])
 

@@ -35,7 +35,7 @@ class CrackerBox(Box):
         """Mass of the box, full of the same filling [kg]."""
         return REAL_MASS * self.scale**3
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return self.scale * np.array(REAL_EDGES)
 

@@ -68,7 +68,7 @@ class Cup(Turned):
     """Whether the bead is a grip on its inside only, and the wall goes on outside of it. The family sets it."""
     rgba: Rgba = (0.80, 0.45, 0.32, 1.0)
 
-    @cached_property
+    @property
     def stance(self) -> tuple[float, float]:
         return self.base, self.floor
 
@@ -76,7 +76,7 @@ class Cup(Turned):
         """Outer radius at a height above the ground [m]."""
         return self.base + (self.rim - self.base) * height / self.height
 
-    @cached_property
+    @property
     def sections(self) -> list[Section]:
         top, end = self.height - RIM_HEIGHT, self.height
         flat = self.floor - FOOT_PROTRUSION

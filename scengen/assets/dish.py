@@ -35,7 +35,7 @@ class Dish(Turned):
     """Sliding friction of the glaze."""
     rgba: Rgba = (0.88, 0.86, 0.80, 1.0)
 
-    @cached_property
+    @property
     def stance(self) -> tuple[float, float]:
         return self.foot, self.thickness
 
@@ -64,7 +64,7 @@ class Dish(Turned):
         """Height of the rim's lower edge while the opposite side is pressed to the ground [m]."""
         return self.rise * math.cos(self.slope) + (self.radius + self.foot) * math.sin(self.slope)
 
-    @cached_property
+    @property
     def sections(self) -> list[Section]:
         r, f, t = self.radius, self.foot, self.thickness
         bottom = ((0.0, FOOT_PROTRUSION), (f, FOOT_PROTRUSION), (f, t), (0.0, t))

@@ -104,15 +104,15 @@ class StraightHook(Hook):
 
     tip: float
 
-    @cached_property
+    @property
     def inside(self) -> float:
         return self.length / 2 - self.width
 
-    @cached_property
+    @property
     def aside(self) -> float:
         return self.tip
 
-    @cached_property
+    @property
     def engaging(self) -> float:
         return self.tip
 
@@ -136,7 +136,7 @@ class LHook(StraightHook):
     def side(self) -> float:
         return -1.0 if self.mirrored else 1.0
 
-    @cached_property
+    @property
     def bars(self) -> list[Bar]:
         half, middle = self.width / 2, self.length / 2 - self.width / 2
         corner = _point(middle, self.side * half)
@@ -167,11 +167,11 @@ class JHook(Hook):
     def side(self) -> float:
         return -1.0 if self.mirrored else 1.0
 
-    @cached_property
+    @property
     def inside(self) -> float:
         return self.length / 2 + self.radius - self.width / 2
 
-    @cached_property
+    @property
     def aside(self) -> float:
         return 2 * self.radius
 
@@ -179,11 +179,11 @@ class JHook(Hook):
     def depth(self) -> float:
         return self.radius + self.barb
 
-    @cached_property
+    @property
     def engaging(self) -> float:
         return 2 * self.radius - self.width
 
-    @cached_property
+    @property
     def bars(self) -> list[Bar]:
         start = self.length / 2
         straight = [(_point(-start, 0), _point(start, 0), 0.0)]
@@ -227,7 +227,7 @@ class THook(StraightHook):
     friction: float = param(0.8, "1", 0.05, 1.5)
     rgba: Rgba = (0.45, 0.35, 0.65, 1.0)
 
-    @cached_property
+    @property
     def bars(self) -> list[Bar]:
         half, middle = self.width / 2, self.length / 2 - self.width / 2
         return [

@@ -41,7 +41,7 @@ class InlaidRod(Box):
     friction: float = param(0.8, "1", 0.05, 1.5)
     rgba: Rgba = (0.86, 0.70, 0.42, 1.0)
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.height])
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -33,7 +32,7 @@ class Carton(Box):
     rgba: Rgba = (0.75, 0.22, 0.16, 1.0)
     label: Label | None = None
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return np.array([self.length, self.width, self.height])
 

@@ -26,7 +26,7 @@ class Peg(Box):
     friction: float = param(0.6, "1", 0.05, 1.5, hidden=True)
     rgba: Rgba = (0.80, 0.20, 0.15, 1.0)
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.length])
 
@@ -46,7 +46,7 @@ class Plinth(Box):
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: Rgba = (0.45, 0.33, 0.22, 1.0)
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.height])
 

@@ -38,7 +38,7 @@ class Plate(Turned):
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: Rgba = (0.88, 0.86, 0.80, 1.0)
 
-    @cached_property
+    @property
     def stance(self) -> tuple[float, float]:
         return self.foot, self.thickness
 
@@ -52,7 +52,7 @@ class Plate(Turned):
         """Tilt of the plate when its lip is pressed to the ground [rad]. It turns about the edge of its foot."""
         return math.atan2(self.rise, self.radius - self.foot)
 
-    @cached_property
+    @property
     def sections(self) -> list[Section]:
         hole = self.hole if self.hole >= MIN_DETAIL else 0.0
         lip = self.lip if self.lip >= MIN_DETAIL else 0.0

@@ -37,7 +37,7 @@ class Rod(Box):
     friction: float = param(0.9, "1", 0.05, 1.5)
     rgba: Rgba = (0.86, 0.62, 0.20, 1.0)
 
-    @cached_property
+    @property
     def size(self) -> Vec3:
         return np.array([self.width, self.length, self.width])
 

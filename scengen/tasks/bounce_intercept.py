@@ -332,11 +332,11 @@ class BounceIntercept(LaunchedBall):
         """Angle by which the enclosure is turned to the left, `side` included [rad]."""
         return self.side * math.radians(self.turn)
 
-    @cached_property
+    @property
     def u(self) -> Vec3:
         return heading(self.side * self.aim)
 
-    @cached_property
+    @property
     def start(self) -> Vec3:
         return np.array([self.x, self.side * self.y, self.floor + self.ball.radius])
 

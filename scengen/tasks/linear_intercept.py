@@ -293,11 +293,11 @@ class LinearIntercept(LaunchedBall):
         beyond = (1.0 + PARKED_SHARE) * PARKED_HAND - PARKED_SHARE * self.start
         return np.array([beyond[0], beyond[1], self.grip])
 
-    @cached_property
+    @property
     def u(self) -> Vec3:
         return heading(self.heading)
 
-    @cached_property
+    @property
     def start(self) -> Vec3:
         return np.array([self.x, self.y, self.floor + self.ball.radius])
 
