@@ -36,7 +36,7 @@ from .variations import FOREIGN
 
 MAX_HIT = 100_000_000
 """Size of the largest file of a hit that is read [bytes]: an hour of two arms has 20 MB."""
-GRAMMAR = 6
+GRAMMAR = 7
 """Version of macros and tiers: reports of different versions are not comparable."""
 HITS_FOLDER = "hits"
 """Folder of the hits in a pool."""
