@@ -80,7 +80,7 @@ def slide(arm: Arm, against: ArrayLike, along: ArrayLike, seconds: float) -> Pla
 
 
 def until_stopped(arm: Arm, velocity: Vec3, seconds: float, way: Vec3 | None = None) -> Plan:
-    """Move at a velocity [m/s] until the hand hardly moves, with the jaw as it is.
+    """Move at a velocity [m/s] until the hand has almost stopped, with the jaw as it is.
 
     Args:
         arm: the arm.
