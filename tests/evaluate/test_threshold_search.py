@@ -348,7 +348,7 @@ def test_a_table_of_another_search_is_refuted(found, tmp_path, name, capsys):
     path.write_text(json.dumps(table))
     assert cli.run(["verify", f"results={tmp_path / 'other'}"]) in (1, 2)
     if name == "seed":
-        told = capsys.readouterr().out
+        told = capsys.readouterr().err
         assert "table.json is of a search with seed = 3, run.json of one with 7400" in told
         assert "is missing" not in told
 
