@@ -237,6 +237,18 @@ class Task:
         """
         return designs.parse(spelled, self.name, self.training)
 
+    def different(self, split: Split | str, sampler: str) -> tuple[int | None, str]:
+        """Number of different scenarios of a split, and what limits it; None without a limit.
+
+        Raises:
+            ScengenError: there is no such split or no such design.
+        """
+        replaced, design = self.shifts(split), self.design(sampler)
+        if design.size is not None:
+            return design.size, f"sampler={sampler} has {design.size} different ones"
+        constant = all(isinstance(dist, Fixed) for dist in {**self.training, **replaced}.values())
+        return (1, f"all scenarios of split {split} are equal, because no parameter varies") if constant else (None, "")
+
     def draw(self, split: Split | str, seed: int, index: int, design: Design | None = None) -> Draw:
         """Draw scenario `index` of a split. It depends on (task, parameter, seed, index, attempt) and nothing else.
 
