@@ -17,6 +17,7 @@ from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Conditions, Refutation, Scenario
 from ..sim.embodiment import EMBODIMENTS
+from ..work.foreign import place_of
 from . import conditions, designs
 from .axis import Axis, Proof
 from .designs import Design, Independent
@@ -406,6 +407,8 @@ def _family(name: str, path: Any) -> type[Scenario]:
         why = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
         if isinstance(error, ModuleNotFoundError) and error.name == module.partition(".")[0]:
             why += "; install the package, as with pip install --editable FOLDER"
+        elif place := place_of(error):
+            why += f", {place}"
         raise BadConfig(f"{name}.family = {cut(repr(path))} cannot be imported ({why})") from None
     if not (isinstance(family, type) and issubclass(family, Scenario)):
         raise BadConfig(f"{name}.family = {cut(repr(path))} is not a Scenario")

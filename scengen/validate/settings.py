@@ -72,7 +72,7 @@ class CertifySettings:
             shown = math.floor(100 * lower_bound(runs, runs)) / 100
             more = f"certify.robust.runs={fewest}, or " if fewest else ""
             raise BadConfig(
-                f"certify.robust.runs = {runs} with certify.robust.bound = {bound:g} can never be met: {runs} successes "
+                f"certify.robust.runs = {runs} with certify.robust.bound = {bound:g} cannot be met: {runs} successes "
                 f"in {runs} runs show {lower_bound(runs, runs):.3g}; give {more}certify.robust.bound={shown:g}"
             )
 

@@ -17,7 +17,7 @@ REFERENCE = "pool=generated/reference"
         (("generate", "certify.robust.runs=2"), "certify.robust.runs=4, or certify.robust.bound=0.22"),
         (("generate", "certify.robust.bound=0.9"), "certify.robust.runs=29, or certify.robust.bound=0.47"),
         (("generate", "certify.robust.bound=1"), "show 0.473; give certify.robust.bound=0.47"),
-        (("axis", "card", "axis=diagonal", "certify.robust.runs=2"), "can never be met"),
+        (("axis", "card", "axis=diagonal", "certify.robust.runs=2"), "cannot be met"),
         (("generate", "certify.rest.drift=0"), "certify.rest.drift = 0.0; it must lie in [1e-05, 0.1] m"),
         (("generate", "certify.attack=1"), "a plan is played filtered and raw; give 0, or 2 or more"),
         (("generate", "n=5", "limit=3"), "limit = 3; 5 scenarios need at least as many tries; give limit=5"),
@@ -32,7 +32,7 @@ REFERENCE = "pool=generated/reference"
 )
 def test_what_no_draw_can_meet_is_refused_before_the_first_draw(argv, told, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    place = 2 if argv[0] in ("axis",) or argv[1] == "pad" else 1
+    place = 2 if argv[0] == "axis" or argv[1] == "pad" else 1
     assert cli.run([*argv[:place], DOMINO, *argv[place:]]) == 2
     shown = capsys.readouterr().err
     assert told in shown and shown.count("\n") == 1 and not list(tmp_path.iterdir())
@@ -42,7 +42,7 @@ def test_what_no_draw_can_meet_is_refused_before_the_first_draw(argv, told, caps
 def test_a_bound_that_its_runs_just_show_is_accepted(runs):
     shown = lower_bound(runs, runs)
     CertifySettings(robust=Robust(runs=runs, bound=shown)).check()
-    with pytest.raises(BadConfig, match="can never be met"):
+    with pytest.raises(BadConfig, match="cannot be met"):
         CertifySettings(robust=Robust(runs=runs, bound=shown + 1e-9)).check()
 
 
