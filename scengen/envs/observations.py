@@ -277,7 +277,7 @@ class Entry:
     def __str__(self) -> str:
         place, numbers = f"{self.stream}[{self.where.start}:{self.where.stop}]", self.numbers
         several = numbers if len(numbers) < MANY else (numbers[0], "to", numbers[-1])
-        return " ".join([f"{place:24}", f"{self.name:30}", *several, self.unit]).rstrip()
+        return " ".join([f"{place:24}", f"{self.name:28}", *several, self.unit]).rstrip()
 
 
 MANY = 5
