@@ -166,7 +166,7 @@ def stored_source(path: Path) -> dict[str, Any]:
 
     try:
         with h5py.File(path, "r") as file:
-            found = json.loads(file["data"].attrs["scengen"])
+            found = json.loads(str(file["data"].attrs["scengen"]))
     except (OSError, KeyError, ValueError, TypeError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
