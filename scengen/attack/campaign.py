@@ -20,6 +20,7 @@ from ..validate.identity import source_sha256
 from ..validate.playable import scene_errors
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
+from ..validate.settings import FEWEST
 from ..validate.verify.claims import alike
 from ..work.fingerprint import fingerprint
 from ..work.limits import at_least
@@ -36,7 +37,7 @@ from .variations import FOREIGN
 
 MAX_HIT = 100_000_000
 """Size of the largest file of a hit that is read [bytes]: an hour of two arms has 20 MB."""
-GRAMMAR = 6
+GRAMMAR = 7
 """Version of macros and tiers: reports of different versions are not comparable."""
 HITS_FOLDER = "hits"
 """Folder of the hits in a pool."""
@@ -258,6 +259,15 @@ def attack(
         order = [one.scenario.id for one in subjects]
         log.sort(lambda record: order.index(record["scenario"]))
         return _report(task, rules, subjects, log, folder, priors)
+
+
+def check_budget(setting: str, budget: int, scenarios: int) -> None:
+    """Raise `BadConfig` if a budget is too small to attack every scenario."""
+    if budget < (fewest := FEWEST * scenarios):
+        raise BadConfig(
+            f"{setting} = {budget} for {scenarios} scenarios; each attack plays a plan filtered and raw, which needs "
+            f"{fewest} rollouts; give {setting}={fewest} or more, or fewer scenarios"
+        )
 
 
 def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ... import compose
 from ...attack.adversary import LEAKS, TIERS
-from ...attack.campaign import AttackReport, AttackSettings, Subject, attack, certified, drawn
+from ...attack.campaign import AttackReport, AttackSettings, Subject, attack, certified, check_budget, drawn
 from ...attack.evidence import spelled
 from ...attack.priors import Prior
 from ...errors import BadConfig
@@ -35,6 +35,7 @@ def command(arguments: Arguments) -> int:
     try_file(settings.json)
     try_folder(settings.to)
     task, pool = _task(arguments, settings)
+    check_budget("budget", settings.budget, settings.n if pool is None else min(settings.n, len(pool)))
     folder = Path(settings.to or f"generated/attack/{task.name}")
     try_folder(folder)
     plain = asdict(_leaks(task, settings)) if settings.observed else None
