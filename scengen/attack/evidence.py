@@ -50,7 +50,7 @@ passes with a probability of 13 %."""
 
 
 RESUMED = " from a state of the witness on"
-"""Remark about a filtered hit that `Hit.resumed` tells of."""
+"""Remark about a filtered hit that is `Hit.resumed`."""
 
 
 def spelled(raw: bool) -> str:

@@ -161,7 +161,7 @@ class Demonstrations:
 
 
 def stored_source(path: Path) -> dict[str, Any]:
-    """What a file says of its origin, see `Demonstrations.finish`; nothing if it is no file of scengen."""
+    """What a file says of its origin, see `Demonstrations.finish`; nothing if scengen has not written it."""
     import h5py
 
     try:
