@@ -145,7 +145,8 @@ class Sheet:
                 raise UnknownName(f"kind of {where}, facts.{id_}", question.kind, KINDS)
             right = question.rights
             if strange := [option for option in right if option not in _options(question)]:
-                raise BadConfig(f"{where}: {id_}.right = {cut(strange[0])}; it is none of the options")
+                known = cut(", ".join(_options(question)))
+                raise BadConfig(f"{where}: {id_}.right = {cut(strange[0])}; it must be one of the options: {known}")
         for id_, subgoal in self.order.items():
             if strange := [name for name in subgoal.objects if name not in self.objects]:
                 raise UnknownName(f"object of {where}, order.{id_}", strange[0], self.objects)

@@ -267,7 +267,7 @@ def unread(folder: str) -> str:
         if shadow.is_file():
             return f"{path} would not be read, scengen has a file of that name; give it another name"
         if group in OF_TASKS and not (here / "task" / path.name).is_file():
-            return f"{path} would not be read, there is no task/{path.name} beside it; name it after a task there"
+            return f"{path} would not be read, its folder has no task/{path.name}; name it after a task there"
         if group == "perturbations":
             return f"{path} would not be read; offer the folder by an installed package, see docs/perturb.md"
     return ""
