@@ -16,7 +16,7 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from ..errors import BadConfig, ForeignCode, ScengenError, cut, nearest
+from ..errors import BadConfig, ForeignCode, ScengenError, cut, nearest, place_of
 from .verbs import COMMANDS, CONTINUING, FORMS, GROUPS, ONLY_FORMS, RENAMED, VERBS, file_stem, parsed
 
 OK = 0
@@ -142,8 +142,6 @@ def _interrupted(argv: Sequence[str]) -> int:
 
 def _status_of(error: Exception) -> int:
     """Print an error in one line. Returns the exit status."""
-    from ..work.foreign import place_of
-
     place = place_of(error)
     if isinstance(error, ForeignCode):
         return _failed(str(error), _write_traceback(error))

@@ -6,8 +6,7 @@ import pytest
 
 from scengen import cli
 from scengen.cli.commands import tasks
-from scengen.errors import UnknownName
-from scengen.work.foreign import place_of
+from scengen.errors import UnknownName, place_of
 from scengen.work.parallel import portable
 
 TASK = """

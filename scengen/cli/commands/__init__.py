@@ -118,3 +118,15 @@ def misnaming_remarked() -> Iterator[None]:
 def write_json(path: str, result: Any) -> None:
     """Write the result of a command to the file that json= names."""
     write(Path(path), json.dumps(result, indent=1) + "\n")
+
+
+def say_begun(count: int, what: str, folder: Path, fresh: bool) -> None:
+    """Say before the work that a run continues or starts over, if an earlier one has finished something.
+
+    Args:
+        count: number of things that the earlier run has finished.
+        what: the things, such as "scenarios".
+    """
+    if count:
+        fate = "moved aside, and made again" if fresh else "kept; fresh=true starts over"
+        say(f"{folder}: {count} {what} of an earlier run are {fate}")

@@ -10,10 +10,11 @@ from rich.table import Table
 from ...compose import Combination, combinations
 from ...demos.generate import STEPS, DemosSettings, DemosSummary, generate_demonstrations
 from ...errors import BadConfig, ScengenError
+from ...runs.journal import begun
 from ...runs.progress import ProgressBar
 from ...samplers.task import Task
 from ...validate.settings import CertifySettings
-from . import FAILED, OK, Arguments, err, out, say, warn
+from . import FAILED, OK, Arguments, err, out, say, say_begun, warn
 from .settings import read_task
 
 GENERATED = "generated"
@@ -33,6 +34,7 @@ class Run:
     def __call__(self) -> DemosSummary:
         """Make the demonstrations, and print a summary."""
         task, settings = self.task, self.settings
+        say_begun(begun(settings.folder(task)), "attempts", settings.folder(task), settings.fresh)
         with ProgressBar(err, f"{task.name}/{settings.split} demos", settings.n, settings.workers) as progress_bar:
 
             def progress(kept: int, tried: int, verdicts: Mapping[str, int], reasons: Mapping[str, int]) -> None:

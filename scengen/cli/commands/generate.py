@@ -14,6 +14,7 @@ from ...errors import BadConfig, ScengenError, cut
 from ...perturb.perturbation import NONE, Perturbation
 from ...pool import collection
 from ...runs.generate import GenerateSettings, Summary, generate
+from ...runs.journal import begun
 from ...runs.progress import ProgressBar
 from ...samplers.conditions import KINDS, split_under
 from ...samplers.designs import SOBOL
@@ -21,7 +22,7 @@ from ...samplers.split import Split
 from ...samplers.task import Task
 from ...validate.settings import CertifySettings
 from ..tables import attack_table, funnel_table, summary_lines
-from . import FAILED, OK, Arguments, err, intake, out, say, warn
+from . import FAILED, OK, Arguments, err, intake, out, say, say_begun, warn
 from .settings import read_task
 
 T = TypeVar("T")
@@ -56,6 +57,7 @@ class Run:
         if settings.sampler == "sobol" and settings.n < SOBOL:
             what = f"in {settings.n} points of a Sobol set some pairs of parameters correlate by chance"
             warn(f"scengen: {what}, up to 0.95 at 32; give n={SOBOL} or more, or sampler=lhs:{settings.n}")
+        say_begun(begun(settings.folder(task)), "draws", settings.folder(task), settings.fresh)
         rejections: Counter[str] = Counter()
         try:
             with ProgressBar(err, f"{task.name}/{settings.split}", settings.n, settings.workers) as progress_bar:

@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from ... import compose
+from ... import compose, conformance
 from ...errors import UnknownName
 from ...evidence import ledger
 from ...evidence.table import evidence_table
 from ...samplers import task_files
 from ...samplers.task_files import about, search_path
 from ..tables import axes_table, task_tables, tasks_table
-from . import OK, Arguments, out, say
+from . import OK, Arguments, out, remark, say
 from .settings import read
 
 PAPER = "paper"
@@ -52,3 +52,5 @@ def _print(axes: str | None, name: str | None, arguments: Arguments) -> None:
     else:
         for table in (*task_tables(tasks[0]), evidence_table(tasks[0])):
             out.print(table)
+        for refused in conformance.at_sight(tasks[0].name, others):
+            remark(f"the rules for tasks refuse this: {refused} (scengen.conformance)")
