@@ -230,7 +230,7 @@ def _scenes_have_controls(task: Task, split: str, scenarios: int, seed: int) -> 
     for i in range(scenarios):
         scenario, where = task.draw(split, seed, i).scenario, f"{task.name}/{split}/{i}"
         shortcuts, ablations = scenario.shortcuts(), scenario.ablations()
-        few = f"{where} has {len(shortcuts)} shortcut(s); at least {MIN_SHORTCUTS} must show that its bottleneck is real"
+        few = f"{where} has {len(shortcuts)} shortcuts; at least {MIN_SHORTCUTS} must show that its bottleneck is real"
         _require(len(shortcuts) >= MIN_SHORTCUTS, few)
         missing = f"{where} has no ablations, which show that the intended means are needed; add one, or say why not"
         _require(bool(ablations or scenario.NO_ABLATIONS), f"{missing} in NO_ABLATIONS")
