@@ -7,6 +7,7 @@ Tasks are composed and loaded here, too. Each of Hydra's errors becomes one line
 import itertools
 import logging
 import math
+import os
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +21,7 @@ import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override
+from hydra.core.override_parser.types import Override, ValueType
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -29,6 +30,7 @@ from .errors import SHOWN_LENGTH, BadConfig, UnknownName, cut
 from .samplers.task import Task, load
 from .samplers.task_files import (
     ORIGINS,
+    SEARCH_PATH,
     category,
     command_file,
     conf_dir,
@@ -120,7 +122,7 @@ def composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[
     """
     with initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
         try:
-            prepared = [_with_list(text) for text in overrides]
+            prepared = _all_prepared(overrides)
             for text in prepared:
                 _check_override(verb, text)
             prepared = _with_packages(prepared) if groups(verb) else prepared
@@ -195,7 +197,7 @@ def print_origin(verb: str, overrides: Sequence[str], topic: str) -> None:
         raise UnknownName("information of --info", topic, ORIGINS)
     composed(verb, overrides)
     with _logging_restored(), initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
-        prepared = [_with_list(text) for text in overrides]
+        prepared = _all_prepared(overrides)
         prepared = _with_packages(prepared) if groups(verb) else prepared
         GlobalHydra.instance().hydra.show_info(topic, config_name(verb), prepared)  # type: ignore[union-attr]
 
@@ -218,25 +220,77 @@ MAX_DIGITS = 4300
 """Number of digits of the longest number that Python reads."""
 MAX_DEPTH = 20
 """Largest nesting of lists and groups in an override: more than any file of conf/ needs."""
-LISTS = ("pool", "cameras", "mujoco", "apart", "data", "styles", "splits")
+LISTS = ("pool", "policy", "cameras", "mujoco", "apart", "data", "styles", "splits")
 """Settings for which several values are a list and not a sweep. `keep` is always a list."""
+PATHS = (
+    *("pool", "apart", "data", "to", "film", "json", "junit", "hit", "hits", "results", "records", "ycb", "mesh"),
+    *("policy", "client", "edition", "model", "device", "url", "title"),
+)
+"""Settings with paths, addresses or words of people, which are taken as they are: no letter in them means anything to
+Hydra, except in a value that is quoted or a list in brackets."""
+HYDRAS = re.compile(r"""'.*'|".*"|\[.*\]|\w+\(.*\)|null""", re.S)
+"""Values that may be Hydra's: quoted ones, lists, functions such as `choice(a,b)`, and null."""
 
 
-def _with_list(text: str) -> str:
-    """An override with brackets around the values of a setting that is a list, such as `keep=refuted,unknown`.
+def _all_prepared(overrides: Sequence[str]) -> list[str]:
+    """The overrides of a command line as Hydra reads them."""
+    task = next((text.removeprefix("task=") for text in overrides if text.startswith("task=")), "${task}")
+    return [_prepared(text, task) for text in overrides]
+
+
+def _prepared(text: str, task: str = "${task}") -> str:
+    """An override as Hydra reads it: paths and ids quoted, and brackets around the values of a setting that is a list.
 
     The value of `id` is quoted: `12e4` is the beginning of an id and not a number.
+
+    Args:
+        task: text for `${task}` in a path.
     """
-    key, _, value = text.partition("=")
+    if text.startswith(SEARCH_PATH):
+        return search_path([text])[0]
+    key, given, value = text.partition("=")
     if key == "id" and value != "null" and re.fullmatch(r"[\w@+/]+", value, re.ASCII):
         return f"id='{value}'"
+    if key in PATHS and given:
+        value = value.replace("${task}", task)
+        named = [value] if key not in LISTS or _is_hydras(value) else _split(value)
+        whole = [path if _is_hydras(path) else _quote(_at_home(path)) for path in named]
+        return f"{key}={whole[0]}" if len(whole) == 1 else f"{key}=[{','.join(whole)}]"
     is_list = key == "keep" or (key in LISTS and "," in value and value[:1] not in ("'", '"'))
     return f"{key}=[{value}]" if is_list and not value.startswith("[") else text
 
 
+def _is_hydras(value: str) -> bool:
+    """Whether a value of one of `PATHS` is meant for Hydra: no file has this name, and Hydra can read it."""
+    if not HYDRAS.fullmatch(value) or os.path.exists(value) or (override := _parsed(f"key={value}")) is None:
+        return False
+    return not override.is_sweep_override() or override.value_type is not ValueType.SIMPLE_CHOICE_SWEEP
+
+
+def _split(value: str) -> list[str]:
+    """Paths of a list with commas. The longest part that exists is one of them: a comma may belong to a name."""
+    parts, found = value.split(","), list[str]()
+    while parts:
+        longest = next((n for n in range(len(parts), 0, -1) if os.path.exists(",".join(parts[:n]))), 1)
+        found.append(",".join(parts[:longest]))
+        parts = parts[longest:]
+    return found
+
+
+def _at_home(path: str) -> str:
+    """A path with the home folder for `~`, which shells leave after an `=`."""
+    return os.path.expanduser(path) if path.startswith("~") and not os.path.exists(path) else path
+
+
+def _quote(value: str) -> str:
+    """A text in quotes as Hydra reads them: backslashes before a quote, or at the end, are doubled."""
+    doubled = re.sub(r"(\\*)('|$)", lambda found: 2 * found[1] + ("\\'" if found[2] else ""), value)
+    return f"'{doubled}'"
+
+
 def _with_packages(overrides: Sequence[str]) -> list[str]:
     """Overrides that make Hydra search installed packages, too, after the folders that the overrides name."""
-    named, others = search_path(overrides), [text for text in overrides if not text.startswith("hydra.searchpath=")]
+    named, others = search_path(overrides), [text for text in overrides if not text.startswith(SEARCH_PATH)]
     if not packages():
         return [*named, *others]
     values = [override.value() for text in named if (override := _parsed(text))]
@@ -257,7 +311,7 @@ def _check_override(verb: str, text: str) -> None:
     if override is None and re.search(rf"\d{{{MAX_DIGITS + 1}}}", text):
         raise BadConfig(f"{quoted} has a number of more than {MAX_DIGITS} digits; give a shorter one")
     if override is None or not override.key_or_group:
-        raise BadConfig(f"{quoted} is not an override; expected key=value{_quoted(text)}")
+        raise BadConfig(f"{quoted} is not an override; expected key=value{_remedy(verb, text)}")
     key = override.key_or_group
     if override.package is not None:
         raise BadConfig(f"{quoted}: a setting has no package after @; see scengen {verb} --help")
@@ -291,13 +345,17 @@ def _known(verb: str) -> list[str]:
     return [*groups(verb), *(name for name in own if name != "defaults")]
 
 
-def _quoted(text: str) -> str:
-    """The remedy for a value with letters that mean something to Hydra, as a shell takes it."""
+def _remedy(verb: str, text: str) -> str:
+    """The remedy for an override that Hydra cannot read: a name for a bare word, or quotes as a shell takes them."""
     key, given, value = text.partition("=")
     fixed = f'{key}="{value}"'
     if given and len(text) < SHOWN_LENGTH and re.fullmatch(r"[\w.+]+", key) and _parsed(fixed):
         return f"; quote the value twice: {shlex.quote(fixed)}"
-    return ", quoted if the value holds spaces or commas"
+    if not given and "task" in groups(verb) and text in tasks():
+        return f"; did you mean task={text}?"
+    if not given and (named := [key for key in ("pool", "data") if key in _known(verb)]) and os.path.exists(text):
+        return f"; did you mean {named[0]}={cut(text)}?"
+    return f"; see scengen {verb} --help"
 
 
 def _files_of(group: str) -> str:
@@ -354,7 +412,7 @@ def combinations(verb: str, overrides: Sequence[str]) -> list[Combination]:
     with initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
         parser = OverridesParser.create(config_loader=GlobalHydra.instance().config_loader())
         try:
-            choices = [_swept_values(parser, _with_list(text)) for text in overrides]
+            choices = [_swept_values(parser, _prepared(text)) for text in overrides]
         except HydraException as error:
             raise BadConfig(f"{_one_line(str(error))}; see scengen {verb} --help") from None
     if (count := math.prod(len(values) for _, values in choices)) > MAX_COMBINATIONS:
