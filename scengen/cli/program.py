@@ -6,6 +6,7 @@ import re
 import signal
 import sys
 import tempfile
+import textwrap
 import threading
 import traceback
 import warnings
@@ -320,18 +321,30 @@ def _write_traceback(error: BaseException) -> str:
 
 def _help() -> str:
     """The commands by purpose, each with the docstring of its module and its forms."""
+    from .usage import columns
+
+    room = columns()
+
+    def about(verb: str) -> str:
+        start = f"  {verb:<{NAMES - 3}} "
+        hang = " " * NAMES
+        return textwrap.fill(_purpose(verb), room, initial_indent=start, subsequent_indent=hang)
+
     lines = ["scengen: physical puzzles for robot manipulation, each verified to be solvable", ""]
-    lines += ["usage: scengen COMMAND [key=value ...]      settings of a command: scengen help COMMAND", ""]
+    lines += ["usage: scengen COMMAND [key=value ...]", "settings of a command: scengen help COMMAND", ""]
     for purpose, verbs in GROUPS.items():
         lines.append(f"{purpose}:")
         for verb in verbs:
-            if verb not in ONLY_FORMS:
-                lines.append(f"  {verb:<18}{_purpose(verb)}")
-            lines += [f"  {verb} {form:<{17 - len(verb)}}{_purpose(f'{verb} {form}')}" for form in FORMS.get(verb, ())]
+            forms = [f"{verb} {form}" for form in FORMS.get(verb, ())]
+            lines += map(about, forms if verb in ONLY_FORMS else [verb, *forms])
         lines.append("")
-    lines.append("example: scengen generate task=domino_single split=low_starter n=20 workers=2 pool=generated/low")
+    lines.append("example: scengen generate task=domino_single split=low_starter n=20")
     lines.append('completion in bash: eval "$(scengen --completion bash)"')
     return "\n".join(lines)
+
+
+NAMES = 23
+"""Width of the column of commands in the help [characters]."""
 
 
 def _purpose(verb: str) -> str:
