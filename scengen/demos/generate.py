@@ -72,6 +72,7 @@ class DemosSettings:
     limit_seconds: float = 600.0
     limit_mb: int = 4000
     fresh: bool = False
+    json: str | None = None
 
     def folder(self, task: Task) -> Path:
         """Folder of the demonstrations."""

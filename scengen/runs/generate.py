@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from ..attack import campaign as attacks
 from ..attack.check import attacked
@@ -45,6 +46,7 @@ class GenerateSettings:
     limit_mb: int = 4000
     attack: int = 0
     fresh: bool = False
+    json: str | None = None
 
     def folder(self, task: Task) -> Path:
         """Folder of the pool."""
@@ -77,6 +79,12 @@ class Summary:
     """Report of the adversary, if an attack was requested."""
     cpu: float
     """Processor time of all counted indices, in this run or earlier ones [s]."""
+
+    def plain(self) -> dict[str, Any]:
+        """The summary as plain data."""
+        counts = {name: getattr(self, name) for name in ("certified", "indices", "first_draws", "funnel", "reasons")}
+        attack = self.attack and self.attack.plain()
+        return {"pool": str(self.pool.folder), "sha256": self.pool.sha256, **counts, "cpu": self.cpu, "attack": attack}
 
 
 @dataclass(frozen=True)

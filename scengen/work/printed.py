@@ -105,16 +105,19 @@ def _blocks(table: Table, room: int) -> Iterator[tuple[str, str]]:
     """The rows of a table as blocks, each line with its style: a head, and the other cells with their headers."""
     columns = [(str(column.header), _cells(column)) for column in table.columns]
     heads = next((k for k, column in enumerate(table.columns) if k and not _is_name(column)), len(columns))
-    if table.title:
-        yield str(table.title), "italic"
+    yield from ((line, "italic") for line in _wrapped(str(table.title or ""), room))
     for k, row in enumerate(table.rows):
         cells = [(header, each[k]) for header, each in columns]
         style = str(row.style or "")
-        if head := "  ".join(cell for _, cell in cells[:heads] if cell):
-            yield head, style or "bold"
+        head = "  ".join(cell for _, cell in cells[:heads] if cell)
         rest = "; ".join(f"{header}: {cell}" if header else cell for header, cell in cells[heads:] if cell)
-        for line in textwrap.wrap(rest, max(room - 2, 20), break_long_words=False, break_on_hyphens=False):
-            yield f"  {line}", style
-    if table.caption:
-        for line in textwrap.wrap(str(table.caption), room, break_long_words=False, break_on_hyphens=False):
-            yield line, "dim"
+        if table.show_header:
+            yield from ((line, style or "bold") for line in _wrapped(head, room))
+        else:
+            rest = f"{head}: {rest}"
+        yield from ((f"  {line}", style) for line in _wrapped(rest, max(room - 2, 20)))
+    yield from ((line, "dim") for line in _wrapped(str(table.caption or ""), room))
+
+
+def _wrapped(text: str, room: int) -> list[str]:
+    return textwrap.wrap(text, room, break_long_words=False, break_on_hyphens=False)

@@ -26,7 +26,7 @@ def printed(table, wide):
 
 def words(table):
     """All words of a table, without the headers of names, which blocks leave out."""
-    headers = [str(column.header) for column in table.columns if not column.no_wrap]
+    headers = [str(column.header) for column in table.columns[1:] if not column.no_wrap]
     texts = headers + [str(c) for column in table.columns for c in column.cells]
     return {word for text in [*texts, str(table.title or ""), str(table.caption or "")] for word in text.split()}
 

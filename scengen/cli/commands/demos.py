@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from rich.table import Table
 
@@ -14,7 +15,8 @@ from ...runs.journal import begun
 from ...runs.progress import ProgressBar
 from ...samplers.task import Task
 from ...validate.settings import CertifySettings
-from . import FAILED, OK, Arguments, err, out, say, say_begun, warn
+from ...work.targets import try_file
+from . import FAILED, OK, Arguments, err, out, say, say_begun, warn, write_json
 from .settings import read_task
 
 GENERATED = "generated"
@@ -64,8 +66,19 @@ def command(arguments: Arguments) -> int:
             f"repeat the command for each value of {others[0]}, with another to=" if others else "give each value once"
         )
         raise BadConfig(f"{times} of the combinations would be written to {folder}; {remedy}")
-    statuses = [OK if run().made == run.settings.n else FAILED for run in runs]
-    return max(statuses)
+    target = runs[0].settings.json
+    try_file(target)
+    summaries = [run() for run in runs]
+    if target:
+        write_json(target, [_plain(summary) for summary in summaries])
+    return max(OK if each.made == run.settings.n else FAILED for each, run in zip(summaries, runs, strict=True))
+
+
+def _plain(summary: DemosSummary) -> dict[str, Any]:
+    """A summary as plain data."""
+    manifest, made = summary.manifest, summary.demonstrations
+    counts = {name: getattr(manifest, name) for name in ("indices", "styles", "funnel", "reasons")}
+    return {"to": str(made.folder), "sha256": made.sha256, "made": summary.made, **counts, "cpu": summary.cpu}
 
 
 def _checked(requested: Combination, several: bool) -> Run:
