@@ -85,14 +85,22 @@ def certify_levels(task: Task) -> dict[str, CertifySettings]:
     return {name: typed("certify", CertifySettings, certify_node({}, task, name)) for name in names}
 
 
-def certify_node(node: Mapping[str, Any], task: Task, level: str) -> dict[str, Any]:
+def certify_node(
+    node: Mapping[str, Any], task: Task, level: str, verb: str = "", words: Sequence[str] = ()
+) -> dict[str, Any]:
     """Settings of certificates as plain data: the file of the level, then those of the task, then the command line.
 
     Args:
         node: the composed settings, in which those of the task are not merged yet.
-        level: name of a file in conf/certify.
+        level: name of a file in conf/certify, or in a folder certify/ of the search path.
+        verb: the command, for a level of the search path.
+        words: its command line.
     """
-    base: dict[str, Any] = OmegaConf.to_container(OmegaConf.load(conf_dir() / "certify" / f"{level}.yaml"))  # type: ignore[assignment]
+    base: dict[str, Any]
+    if (file := conf_dir() / "certify" / f"{level}.yaml").is_file():
+        base = OmegaConf.to_container(OmegaConf.load(file))  # type: ignore[assignment]
+    else:
+        base = composed(verb, [word for word in words if not re.match(r"[+~]*certify\.", word)])[0]["certify"]
     overrides = OmegaConf.create(_difference(node, base))
     return OmegaConf.to_container(OmegaConf.merge(base, OmegaConf.create(dict(task.certify)), overrides))  # type: ignore[return-value]
 
@@ -181,10 +189,27 @@ def as_yaml(verb: str, overrides: Sequence[str]) -> str:
     """
     plain, choices = composed(verb, overrides)
     if {"certify", "task"} <= choices.keys():
-        plain["certify"] = certify_node(plain["certify"], load(choices["task"], plain["task"]), choices["certify"])
+        plain["certify"] = certify_node(
+            plain["certify"], load(choices["task"], plain["task"]), choices["certify"], verb, overrides
+        )
     flows = {key: None if isinstance(value, dict) else False for key, value in plain.items()}  # None: leaves in a line
     style = {"sort_keys": False, "allow_unicode": True, "width": 120}
     return "".join(yaml.safe_dump({key: plain[key]}, default_flow_style=flow, **style) for key, flow in flows.items())
+
+
+def hydra_yaml(verb: str, overrides: Sequence[str]) -> str:
+    """Hydra's own configuration of a command as YAML: `--cfg hydra`.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    composed(verb, overrides)
+    with initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
+        prepared = _all_prepared(overrides)
+        prepared = _with_packages(prepared) if groups(verb) else prepared
+        node = compose(config_name(verb), overrides=prepared, return_hydra_config=True)
+        OmegaConf.set_struct(node, False)
+        return OmegaConf.to_yaml(OmegaConf.create({"hydra": OmegaConf.to_container(node.hydra, resolve=False)}))
 
 
 def print_origin(verb: str, overrides: Sequence[str], topic: str) -> None:
@@ -193,6 +218,10 @@ def print_origin(verb: str, overrides: Sequence[str], topic: str) -> None:
     Raises:
         ScengenError: one line that says what is wrong.
     """
+    if not topic:
+        for each in ORIGINS[:-1]:  # the last one repeats the others, as Hydra's does
+            print_origin(verb, overrides, each)
+        return
     if topic not in ORIGINS:
         raise UnknownName("information of --info", topic, ORIGINS)
     composed(verb, overrides)
@@ -318,7 +347,7 @@ def _check_override(verb: str, text: str) -> None:
     if override.is_sweep_override():
         raise BadConfig(f"{quoted} has multiple values; give one, or quote a value with commas twice: \"{key}='...'\"")
     if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
-        raise BadConfig(f"{quoted}: expected hydra.searchpath=[file:///folder], the only setting of Hydra for scengen")
+        raise BadConfig(f"{quoted}: {_instead_of(key)}; hydra.searchpath is the only setting of Hydra for scengen")
     if override.is_delete() and (name := re.split("[./]", key)[0]) not in (known := _known(verb)):
         raise UnknownName(f"setting of {verb}", name, known)
     if override.is_delete() and not key.startswith("task."):
@@ -337,6 +366,17 @@ def _check_override(verb: str, text: str) -> None:
         raise BadConfig(f"{quoted}: expected the name of a file of conf/{key} without .yaml; {_files_of(key)}")
     if key in groups(verb) and override.value() is None:
         raise BadConfig(f"{quoted}: leave it out, or name a file of conf/{key}")
+
+
+def _instead_of(key: str) -> str:
+    """What to give instead of a setting of Hydra."""
+    said = {
+        "launcher": "workers=N uses the cores of this machine, executor=ray those of a cluster",
+        "sweeper": "several values make a sweep, as in seed=1,2",
+        "sweep": "several values make a sweep, as in seed=1,2, and pool= or to= names its folder",
+        "run": "pool= or to= names the folder of the results",
+    }
+    return said.get(re.split("[./]", key)[1] if re.search("[./]", key) else "", "leave it out")
 
 
 def _known(verb: str) -> list[str]:
@@ -461,10 +501,21 @@ def _explained(verb: str, overrides: Sequence[str], error: Exception) -> BadConf
         return BadConfig(f"{verb} needs {match[1]}=NAME; known: {known}")
     if match := re.search(r"Could not override '([^']+)'", text):
         return _unknown_key(verb, overrides, match[1]) or BadConfig(f"{_one_line(text)}; see scengen {verb} --help")
+    if match := re.match(r"Error merging override (.*)", text):
+        return BadConfig(f"{cut(match[1])} is no value of this setting; {_forms(match[1])}")
     if isinstance(error, OmegaConfBaseException):
         key = f"{error.full_key}: " if error.full_key else ""
         return BadConfig(f"{key}{_one_line(text.splitlines()[0])}; give the value itself")
     return BadConfig(f"{_one_line(text)}; see scengen {verb} --help")
+
+
+def _forms(override: str) -> str:
+    """What a setting accepts that cannot be merged with the value given."""
+    if re.match(r"\+*task\.(id|axes)\.", override):
+        return (
+            "give a number, [uniform, low, high], [loguniform, low, high], [integer, low, high] or [choice, a, b, ...]"
+        )
+    return "give one value of the kind of its default"
 
 
 def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName | BadConfig | None:
@@ -486,6 +537,8 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
             if seen == ["executor"] and not known:
                 return BadConfig(f"{path} is a setting of executor=ray; give that, too")
             unknown = UnknownName(f"key in {'.'.join(seen)}" if seen else f"setting of {verb}", part, known)
+            if seen == ["task", "axes"] and path.count(".") == 2:
+                return BadConfig(f"{unknown}; +{path}={{why: ..., replace: {{...}}}} adds an axis")
             if seen[:2] == ["task", "id"]:  # a parameter that the task file does not list is nominal: it can be added
                 return BadConfig(f"{unknown}; +{path}=... adds one")
             return unknown

@@ -210,6 +210,8 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     flags = [a for a in arguments if a.startswith("-")]
     if flags and flags[0].partition("=")[0] in SHOW_OPTIONS:
         return _show(verb, arguments)
+    if flags and flags[0].partition("=")[0] in ("--config-dir", "-cd", "--config-path", "-cp"):
+        raise BadConfig(f"{flags[0]} is no option of scengen; give hydra.searchpath=FOLDER, which is searched as well")
     if flags:
         known = "settings are key=value, options --help, --cfg job and --info " + "|".join(ORIGINS)
         raise BadConfig(f"{cut(repr(flags[0]))} is not an option; {known}; see scengen {verb} --help")
@@ -249,16 +251,22 @@ def _show(verb: str, arguments: Sequence[str]) -> int:
     words = list(arguments)
     place = next(i for i, word in enumerate(words) if word.startswith("-"))
     option, _, what = words.pop(place).partition("=")
-    if not what and place < len(words):
+    if not what and place < len(words) and "=" not in words[place]:
         what = words.pop(place)
+    words = [word for word in words if word != "--resolve"]  # what is printed is resolved
     if others := [word for word in words if word.startswith("-")]:
         raise BadConfig(f"{cut(repr(others[0]))} cannot be combined with {option}; give one of them")
     if SHOW_OPTIONS[option] == "--info":
         compose.print_origin(verb, words, what)
     elif what == "job":
         out.print(compose.as_yaml(verb, words), end="", soft_wrap=True)
+    elif what in ("hydra", "all"):
+        job = compose.as_yaml(verb, words) if what == "all" else ""
+        out.print(job + compose.hydra_yaml(verb, words), end="", soft_wrap=True)
     else:
-        raise BadConfig(f"{option} {cut(repr(what))}; expected --cfg job, the configuration of the command")
+        raise BadConfig(
+            f"{option} {cut(repr(what))}; expected --cfg job, the configuration of the command, hydra or all"
+        )
     return OK
 
 
