@@ -505,7 +505,7 @@ def _explained(verb: str, overrides: Sequence[str], error: Exception) -> BadConf
     if match := re.search(r"Could not override '([^']+)'", text):
         return _unknown_key(verb, overrides, match[1]) or BadConfig(f"{_one_line(text)}; see scengen {verb} --help")
     if match := re.match(r"Error merging override (.*)", text):
-        return BadConfig(f"{cut(match[1])} is no value of this setting; {_forms(match[1])}")
+        return BadConfig(f"{cut(match[1])} is not a value of this setting; {_forms(match[1])}")
     if isinstance(error, OmegaConfBaseException):
         key = f"{error.full_key}: " if error.full_key else ""
         return BadConfig(f"{key}{_one_line(text.splitlines()[0])}; give the value itself")

@@ -1,4 +1,4 @@
-"""Certificates in words: the numbers of each check as people read them, with units and at most three digits."""
+"""Certificates as text: the numbers of each check as people read them, with units and at most three digits."""
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -28,7 +28,7 @@ def certificate_table(row: PoolRow) -> Table:
 
 
 def found(check: Check) -> str:
-    """What a check that passed has found, in words; its numbers by name if this version has no words for them."""
+    """What a check that passed has found, as text; its numbers by name if nothing else fits them."""
     try:
         return WORDS[check.name](check.settings, check.numbers)
     except (KeyError, TypeError, ValueError):  # a pool may hold anything
@@ -132,5 +132,5 @@ def _endings(ends: Mapping[str, Numbers]) -> str:
 
 
 def _ending(end: Numbers) -> str:
-    """How a rollout ended, in words."""
+    """How a rollout ended, as text."""
     return f"{end['reason'] or end['outcome']} ({end['outcome']} after {end['seconds']:.3g} s)"

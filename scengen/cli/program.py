@@ -211,7 +211,9 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     if flags and flags[0].partition("=")[0] in SHOW_OPTIONS:
         return _show(verb, arguments)
     if flags and flags[0].partition("=")[0] in ("--config-dir", "-cd", "--config-path", "-cp"):
-        raise BadConfig(f"{flags[0]} is no option of scengen; give hydra.searchpath=FOLDER, which is searched as well")
+        raise BadConfig(
+            f"{flags[0]} is not an option of scengen; give hydra.searchpath=FOLDER, which is searched as well"
+        )
     if flags:
         known = "settings are key=value, options --help, --cfg job and --info " + "|".join(ORIGINS)
         raise BadConfig(f"{cut(repr(flags[0]))} is not an option; {known}; see scengen {verb} --help")
