@@ -130,7 +130,7 @@ def test_info_tells_where_it_comes_from(capsys):
 @pytest.mark.parametrize(
     ("asked", "says"),
     [
-        (("--cfg", "all"), "expected --cfg job"),
+        (("--cfg", "jobs"), "expected --cfg job"),
         (("--cfg",), "expected --cfg job"),
         (("--info", "default"), "did you mean 'defaults'?"),
         (("--cfg", "job", "--info", "defaults"), "give one of them"),

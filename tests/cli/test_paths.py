@@ -13,7 +13,7 @@ from scengen.pool import Pool
 from scengen.samplers.task_files import search_path
 
 AWKWARD = ["many/domino_single-id-seed=0", "my pools/id", "[1]", "~draft", "ünï", "a\rb", "it's", 'so "called"', "a\\"]
-REFERENCE = "generated/reference"
+REFERENCE = "generated/reference/domino_single-id"
 
 
 def read(verb, text, *more):
