@@ -89,11 +89,7 @@ def test_search_paths_are_paths(tmp_path, monkeypatch):
     )
 
 
-@pytest.mark.parametrize("shell", [["bash", "-c"], ["zsh", "-c"]])
-def test_what_a_shell_completes_is_what_the_command_reads(tmp_path, shell):
-    if not shutil.which(shell[0]):
-        pytest.skip(f"no {shell[0]} here")
-    quoted = subprocess.run(
-        [*shell, "printf %s pool=my\\ pools/a\\=1"], capture_output=True, text=True, check=True
-    ).stdout
+def test_what_a_shell_completes_is_what_the_command_reads():
+    words = ["bash", "-c", "printf %s pool=my\\ pools/a\\=1"]
+    quoted = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     assert read("show", quoted) == "my pools/a=1"
