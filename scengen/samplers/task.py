@@ -13,11 +13,10 @@ from typing import Any
 from .. import html_tables
 from ..assets.mesh_prop import MeshProp
 from ..assets.ycb import Scan, Ycb, by_name
-from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
+from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest, place_of
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Conditions, Refutation, Scenario
 from ..sim.embodiment import EMBODIMENTS
-from ..work.foreign import place_of
 from . import conditions, designs
 from .axis import Axis, Proof
 from .designs import Design, Independent

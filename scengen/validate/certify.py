@@ -19,7 +19,7 @@ from ..sim import scene_text
 from ..sim.embodiment import JAW, action_size
 from ..sim.world import World
 from .impaired import held, impaired, posed
-from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
+from .rollout import AT_REST, Jitter, Rollout, replay, run, still_moving, try_shortcut
 from .settings import QUICK, CertifySettings
 from .settings import lower_bound as lower_bound  # for those that judge rates
 
@@ -231,7 +231,8 @@ class Trial:
                     return {}, numbers, f"{name!r} reaches the goal ({how})"
                 if tried.outcome == "unstable" or (shortcut.to_rest and tried.reason != AT_REST):
                     seen = "reaches the goal" if tried.lacks else "was not seen to its end"
-                    return {}, numbers, f"{name!r} {seen} ({how}): {tried.reason}"
+                    left = "" if tried.lacks else f"; still moving: {', '.join(still_moving(self.world)) or 'nothing'}"
+                    return {}, numbers, f"{name!r} {seen} ({how}): {tried.reason}{left}"
         return {}, numbers, ""
 
     def _robust(self) -> "Finding":

@@ -17,6 +17,7 @@ from ..episode import STRICT, Actions, Episode, Outcome, Rules
 from ..errors import GaveUp
 from ..samplers.keyed import normals, spread
 from ..scenario import Action, Planner, Scenario, Shortcut
+from ..sim.arm import ROBOT
 from ..sim.world import World
 from .settings import Robust
 
@@ -225,6 +226,16 @@ class _Recorded:
 
     def stop(self) -> None:
         """Called when the goal has been reached; a recording goes on."""
+
+
+def still_moving(world: World) -> list[str]:
+    """Bodies that move faster now than `REST_TOLERANCE` allows a body at rest; `ROBOT` stands for the robot's."""
+    found = dict[str, None]()
+    for dof, speed in enumerate(np.abs(world.data.qvel)):
+        body = int(world.model.dof_bodyid[dof])
+        if speed * REST_TIME >= REST_TOLERANCE:
+            found[ROBOT if body in world.own else world.model.body(body).name] = None
+    return list(found)
 
 
 class Stillness:

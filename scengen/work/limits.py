@@ -44,7 +44,7 @@ computed."""
 
 
 def check_count(n: int, limit: int | None, most: int | None, why: str, what: str) -> None:
-    """Raise `BadConfig` if a run cannot make n results, whatever it draws.
+    """Raise `BadConfig` if a run cannot make n results with any draws.
 
     Args:
         limit: largest number of tries; None if it is not set.

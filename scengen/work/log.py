@@ -143,8 +143,8 @@ class Log:
 
 
 def different(a: Any, b: Any, path: str = "") -> list[str]:
-    """Dotted names of the settings in which two configurations differ."""
+    """Dotted names of the settings in which two configurations differ; the code of a task by this name."""
     if isinstance(a, dict) and isinstance(b, dict):
         keys = sorted(a.keys() | b.keys())
         return [d for k in keys for d in different(a.get(k), b.get(k), f"{path}.{k}".strip("."))]
-    return [] if a == b else [path]
+    return [] if a == b else ["the code of the task" if path == "source_sha256" else path]

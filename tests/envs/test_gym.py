@@ -91,7 +91,9 @@ def test_the_legend_names_every_number_of_every_vector():
     vectors = {name: each for name, each in env.metadata["names"].items() if "tactile" not in name}
     assert names == {entry.rpartition(".")[0] for entries in vectors.values() for entry in entries}
     assert "object-state[26:29]      tile_0_pos                   x y z [m]" in lines
-    assert sum(entry.where.stop - entry.where.start for entry in map(env.entry, names)) == sum(map(len, vectors.values()))
+    assert sum(entry.where.stop - entry.where.start for entry in map(env.entry, names)) == sum(
+        map(len, vectors.values())
+    )
     assert {line.split(" ")[0] for line in lines if "[" not in line} == {"robot0_tactile_left", "rgb_ego_cam"}
     assert max(map(len, lines)) <= 85
 
@@ -101,7 +103,9 @@ def test_the_specification_has_the_time_limit_in_steps(repeat, steps):
     made = gymnasium.make("scengen/domino_single-v2", action_repeat=repeat)
     assert made.spec.max_episode_steps == steps == made.unwrapped.max_episode_steps
     assert "TimeLimit" not in str(made), "the environment truncates by itself, at the limit of the pool"
-    assert gymnasium.make_vec("scengen/domino_single-v2", num_envs=1, action_repeat=repeat).spec.max_episode_steps == steps
+    assert (
+        gymnasium.make_vec("scengen/domino_single-v2", num_envs=1, action_repeat=repeat).spec.max_episode_steps == steps
+    )
 
 
 def test_every_task_is_registered():

@@ -15,15 +15,15 @@ from ...export.mesh import FORMATS, encode
 from ...params import parameters
 from ...pictures import render
 from ...work.targets import try_file, try_folder
-from . import FAILED, OK, Arguments, intake, out, remark, say, write
+from . import FAILED, OK, Arguments, intake, out, remark, say, write, write_json
 from .settings import read
 
 if TYPE_CHECKING:
     from ...intake.asset import MeshAsset
 
 
-_NAMES = ("name", "to", "mesh")
-"""Settings that say what to do. All others are about an imported mesh."""
+_NAMES = ("name", "to", "mesh", "json")
+"""Settings that say what to do and where the list goes. All others are about an imported mesh."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,7 @@ class AssetSettings:
     error: float
     pieces: int
     seed: int
+    json: str | None
 
     def check(self) -> None:
         """Raise `BadConfig` for settings that do not go together."""
@@ -51,6 +52,10 @@ class AssetSettings:
             raise BadConfig(f"asset needs {where}; see scengen asset --help")
         if self.to is not None and self.name is None and self.mesh is None:
             raise BadConfig(f"to = {cut(self.to)}, without an asset; give name=ASSET or mesh=FILE")
+        if self.json is not None and self.to is not None:
+            raise BadConfig(
+                "json= is for the list of assets; an imported mesh has its figures in asset.json; leave it out"
+            )
         if self.mesh is None and (
             unused := [f.name for f in fields(self) if f.name not in _NAMES and self._is_given(f)]
         ):
@@ -69,7 +74,14 @@ def command(arguments: Arguments) -> int:
     if settings.name is not None:
         return _write_mesh(settings.name, Path(str(settings.to)))
     out.print(_table())
+    if settings.json:
+        write_json(settings.json, {name: _plain(kind()) for name, kind in kits().items()})
     return OK
+
+
+def _plain(prop: Any) -> list[dict[str, Any]]:
+    """The parameters of an asset as plain data."""
+    return [{key: getattr(p, key) for key in ("name", "nominal", "low", "high", "unit")} for p in parameters(prop)]
 
 
 def _table() -> Table:
