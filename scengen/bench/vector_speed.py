@@ -28,7 +28,9 @@ def vector_ratios(folder: str, row: PoolRow, repeats: int) -> dict[str, Measure]
     """
     task, actions = row.task, row.witness[:PERIODS]
     seen = {"observations": PROPRIOCEPTION}
-    processes = AsyncVectorEnv([lambda: PoolEnv(task, folder, **seen)] * SLOTS)  # before any thread: it copies this process
+    processes = AsyncVectorEnv(
+        [lambda: PoolEnv(task, folder, **seen)] * SLOTS
+    )  # before any thread: it copies this process
     one, two = (PoolVectorEnv(task, folder, SLOTS, threads, **seen) for threads in (1, 2))
     every, single = PoolVectorEnv(task, folder, SLOTS, **seen), PoolEnv(task, folder, **seen)
     try:

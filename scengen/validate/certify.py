@@ -27,7 +27,7 @@ CONFIDENCE = 0.95
 """Confidence of the one-sided bound on the oracle's success rate."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Certified:
     """A certificate with the scene and the witness that it is about. The scene is empty if it was never built."""
 
@@ -36,6 +36,11 @@ class Certified:
     witness: Actions
     digest: str
     """Hash of the physics state at the end of the witness."""
+
+    def __repr__(self) -> str:
+        made = [check.passed for check in self.certificate.checks if check.passed is not None]
+        checks = f"{sum(made)} of {len(made)} checks passed"
+        return f"Certified({self.certificate.verdict}: {checks}, witness of {len(self.witness)} actions)"
 
     def _repr_html_(self) -> str:
         """Its checks, in a notebook."""
