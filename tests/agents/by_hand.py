@@ -14,7 +14,7 @@ POSE = re.compile(r"^(.+): position \[([^\]]*)\], quaternion xyzw \[([^\]]*)\], 
 
 
 def poses(text):
-    """Middles of the lower sides of the things in a prompt, which stand upright, quaternions and sizes, by their names."""
+    """Middles of the lower sides of the things in a prompt, which stand upright, quaternions and sizes, by name."""
     told = {m[1]: tuple([float(v) for v in group.split(",")] for group in m.groups()[1:]) for m in POSE.finditer(text)}
     return {name: ([x, y, z - size[2] / 2], quat, size) for name, ((x, y, z), quat, size) in told.items()}
 
