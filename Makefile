@@ -34,7 +34,7 @@ ci:
 	$(MAKE) certify N=1 TASKS="domino_single tool_retrieve" SPLITS="diagonal mirrored_hook"
 
 test: setup
-	$(BIN)/scengen verify pool=generated/reference sample=20 workers=2
+	$(BIN)/scengen verify pool=generated/reference sample=1 workers=2
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 # Builds the wheel, installs it with all extras into an environment of its own, and tries it outside this folder. Needs a C
