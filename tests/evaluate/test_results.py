@@ -196,6 +196,7 @@ def edit(results_folder, name, **entries):
         ({"edition": "v1"}, "names edition v1: "),
         ({"tasks": "packing"}, "and no edition"),
         ({"rollouts": 10**6}, "says rollouts = 1000000, and there are 12 lines"),
+        ({"seeds": 4}, "has no line: the table says seeds = 4, the lines have 3"),
     ],
 )
 def test_settings_of_the_table_that_contradict_the_run_are_found(results, tmp_path, entries, says):

@@ -82,6 +82,7 @@ KINDS = {
         ("agent", "model=facts", "pool={pool}", "stage=2", "pictures=false"), "to", ("results-2.jsonl", "table-2.json")
     ),
     "attack": Kind(("attack", "task=domino_single", "n=3", "budget=150"), "to", ("attack.jsonl",), workers=True),
+    "hub": Kind(("export", "hub", "pool={pool}"), "to", ("README.md", "*/*"), workers=True),
     "subset": Kind(("subset", "pool={pool}", "n=3"), "to", ("manifest.json", "*.parquet")),
 }
 STUDIO = "studio"

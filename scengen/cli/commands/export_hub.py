@@ -44,9 +44,9 @@ def command(arguments: Arguments) -> int:
     for name in ("title", "license"):
         if (text := getattr(settings, name)) is not None and (not text.strip() or printable(text) != text):
             raise BadConfig(f"{name} = {cut(repr(text))}; it must be one line of text without control characters")
-    check_target(settings.to)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
     check_pools(pools)
+    check_target(Path(settings.to), pools)
     seed = secrets.randbelow(2**32)
     options = Options(settings.level, settings.sample, True, seed, settings.workers, LIMITS, attacked)
     published = []
@@ -61,9 +61,10 @@ def command(arguments: Arguments) -> int:
         published.append(PublishedPool(pool, report.settings, _verification(report)))
     tasks = dict.fromkeys(pool.task for pool in pools)
     title = settings.title or f"scengen: {', '.join(tasks)}"
-    publish(DatasetCard(published, title, settings.license or own_license()), Path(settings.to))
+    made = publish(DatasetCard(published, title, settings.license or own_license()), Path(settings.to))
     names = ", ".join(one.name for one in published)
-    say(f"wrote {settings.to}: README.md and {sum(map(len, pools))} scenarios as {names}")
+    written = f"wrote {settings.to}" if made else f"{settings.to} holds this data set already"
+    say(f"{written}: README.md and {sum(map(len, pools))} scenarios as {names}")
     say(f"datasets.load_dataset({settings.to!r}, {published[0].name!r}) opens one; upload the folder as it is")
     return OK
 
