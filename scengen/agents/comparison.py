@@ -22,7 +22,7 @@ from .tables import lines
 STAGES = {UNDERSTAND: "1 understand", PLAN: "2 plan", ACT: "3 act"}
 """Stages as the tables name them."""
 SIDES = ("ID", "OOD")
-"""In and out of distribution."""
+"""Names of the two sides of a table, in and out of distribution."""
 ALL = "all"
 """Name of the line over all tasks, and of the split over all axes."""
 

@@ -98,7 +98,7 @@ def grade_plan(plan: Planned, order: Order, objects: Sequence[str]) -> PlanGrade
 
 
 def decided(grades: Mapping[str, Any], executed: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Grades of a plan that was carried out. One that reaches the goal is right in whatever order: what the partial
+    """Grades of a plan that was carried out. One that reaches the goal is right in any order: what the partial
     order says against it is a remark then. Other errors count as before.
 
     Args:

@@ -48,7 +48,7 @@ class View:
     readings: tuple[str, ...]
     """Readings of the sensors, one line for each moment."""
     cameras: str = ""
-    """Where the cameras stand, as text; empty without pictures."""
+    """Places of the cameras as text; empty without pictures."""
 
 
 def observe(env: PoolEnv, scenario: str, moments: int, spacing: float) -> View:

@@ -1,6 +1,6 @@
 """Colours of a mesh file, of its materials, textures, vertices or faces, as few colours of the mesh that pictures show.
 
-Scenes refer to no files and MuJoCo's text holds no texture, so that each colour becomes a mesh of its own.
+Scenes refer to no files and MuJoCo's text holds no texture, so that each colour becomes a separate mesh.
 """
 
 import logging
@@ -46,7 +46,7 @@ class _Beside(trimesh.resolvers.Resolver):
         return read_plain(self.folder / Path(name.replace("\\", "/")).name, MAX_TEXTURE)
 
     def keys(self) -> list[str]:
-        """Names of the files; none, as files are asked for by their names."""
+        """Names of the files; none, as files are requested by their names."""
         return []
 
     def namespaced(self, namespace: str) -> "_Beside":

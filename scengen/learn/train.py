@@ -32,7 +32,7 @@ GIVEN_BY_DATA = ("data", "to", "demonstrations", "task")
 ROUNDING = 1e-4
 """Largest difference of an array that follows from the data, relative beyond 1: machines round differently."""
 RISE = 1.1
-"""Rise of the held-out error above its lowest value from which on a policy is said to have learned by heart: a tenth,
+"""Rise of the held-out error above its lowest value from which on a policy is said to have memorised: a tenth,
 more than errors vary from epoch to epoch."""
 UNFINISHED = "unfinished-{identity}.npz"
 """Name of the file of weights of an unfinished training."""
@@ -95,8 +95,8 @@ class Trained:
     """Number of epochs of earlier runs."""
 
     @property
-    def by_heart(self) -> str:
-        """A line about a policy that learned its demonstrations by heart: the error of those fell on, and that of the
+    def memorised(self) -> str:
+        """A line about a policy that memorised its demonstrations: the error of those fell on, and that of the
         held-out ones rose; empty for others."""
         if not self.losses:
             return ""
@@ -105,7 +105,7 @@ class Trained:
         if held_out <= RISE * lowest or learned >= then:
             return ""
         rose = f"the held-out error rose from {lowest:.3g} after epoch {best + 1} to {held_out:.3g}"
-        return f"{rose}, while that of the demonstrations fell: the policy learned them by heart"
+        return f"{rose}, while that of the demonstrations fell: the policy memorised them"
 
 
 def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, int, str], None]) -> Trained:

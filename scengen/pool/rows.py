@@ -1,5 +1,6 @@
 """Rows in a folder with a manifest: what pools and demonstrations have in common."""
 
+import importlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -154,9 +155,10 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
             BadConfig: pandas is not installed.
         """
         try:
-            return self.to_arrow().to_pandas()
+            importlib.import_module("pandas")
         except ImportError:
             raise BadConfig("to_pandas needs pandas; pip install pandas, or use to_arrow()") from None
+        return self.to_arrow().to_pandas()
 
     def names(self) -> Iterator[Name]:
         """Names of the scenarios of all rows, in their order.

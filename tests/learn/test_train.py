@@ -211,8 +211,8 @@ HARD = {"hidden": [128], "members": 1, "epochs": 80}
 
 def test_a_policy_that_learns_by_heart_is_said_to_and_one_that_learns_is_not(tmp_path):
     noise = trained(tmp_path / "noise", data=by_heart(), **HARD)
-    assert "the held-out error rose from" in noise.by_heart and "learned them by heart" in noise.by_heart
-    assert trained(tmp_path / "shown").by_heart == ""
+    assert "the held-out error rose from" in noise.memorised and "memorised them" in noise.memorised
+    assert trained(tmp_path / "shown").memorised == ""
 
 
 def test_with_patience_the_weights_of_the_best_epoch_are_kept(tmp_path):

@@ -55,9 +55,9 @@ def command(arguments: Arguments) -> int:
         if trained.earlier:
             say(f"{trained.earlier} of {trained.settings.epochs} epochs are from an earlier run")
         say(f"wrote {settings.to}: policy.json, weights.npz, loss.svg")
-        if trained.by_heart and settings.patience is None:
+        if trained.memorised and settings.patience is None:
             remark(
-                f"{trained.by_heart}; more demonstrations help most, or patience=10 keeps the weights of the best epoch"
+                f"{trained.memorised}; more demonstrations help most; patience=10 keeps the weights of the best epoch"
             )
     say(f"next: scengen evaluate policy={settings.to} pool=...")
     return OK
