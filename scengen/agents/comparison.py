@@ -85,9 +85,9 @@ class ModelRun:
     def spent(self, stage: int) -> tuple[str, ...]:
         """Calls, tokens of prompts and answers, and cost of a stage, as text."""
         replies = [call["reply"] for call in self.calls if call["about"]["stage"] == stage]
-        tokens = tuple(sum(reply[name] for reply in replies) for name in ("tokens_in", "tokens_out"))
-        cost = f"{self.prices.of(tokens):.4g}" if self.prices else "no prices"
-        return (str(len(replies)), *map(str, tokens), cost)
+        asked, answered = (sum(reply[name] for reply in replies) for name in ("tokens_in", "tokens_out"))
+        cost = f"{self.prices.of((asked, answered)):.4g}" if self.prices else "no prices"
+        return (str(len(replies)), str(asked), str(answered), cost)
 
 
 def grids(runs: Sequence[ModelRun]) -> list[Grid]:

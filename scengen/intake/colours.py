@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import trimesh
+import trimesh.remesh
+import trimesh.resolvers
 from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import KDTree
@@ -109,7 +111,7 @@ def painted(
     if (np.ptp(found.astype(int), axis=0) <= SAME).all():
         return vertices, faces, (_rgba(found.mean(axis=0)),), np.zeros(len(faces), np.int64)
     longest = float(np.ptp(vertices, axis=0).max()) / PATCHES
-    vertices, faces = trimesh.remesh.subdivide_to_size(vertices, faces, longest, max_iter=20)
+    vertices, faces, *_ = trimesh.remesh.subdivide_to_size(vertices, faces, longest, max_iter=20)
     centres = vertices[faces].mean(axis=1)
     seen = found[KDTree(where).query(centres)[1]].astype(float)
     count = min(MAX_COLOURS, len(np.unique(seen, axis=0)))

@@ -43,7 +43,7 @@ def _run(settings: AgentSettings, search: Sequence[str] = (), ask: bool = True) 
 
 def _report(arguments: Arguments) -> int:
     """Grade an earlier run again from its journal."""
-    given = dict(each.partition("=")[::2] for each in arguments)
+    given = {each.partition("=")[0]: each.partition("=")[2] for each in arguments}
     if len(given) != len(arguments) or not given.get("to") or set(given) - {"to", "runs", "prices"}:
         one, several = "to=FOLDER, the folder of a run", "runs=FOLDER,FOLDER to=FOLDER (and prices=FILE) for several"
         raise BadConfig(f"scengen agent report needs {one}; or {several}")
