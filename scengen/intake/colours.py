@@ -43,7 +43,7 @@ class _Beside(trimesh.resolvers.Resolver):
     def __init__(self, folder: Path):
         self.folder = folder
 
-    def get(self, name: str) -> bytes:
+    def get(self, name: str) -> bytes:  # type: ignore[override]
         """Content of a file next to the mesh."""
         return read_plain(self.folder / Path(name.replace("\\", "/")).name, MAX_TEXTURE)
 
