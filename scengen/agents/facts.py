@@ -115,6 +115,8 @@ class Sheet:
     bodies that begin with `tile_` and have no separate line."""
     parts: list[str] = field(default_factory=list)
     """Names of parts of things, such as a handle, that are not bodies."""
+    rules: list[str] = field(default_factory=list)
+    """Rules that a question asks about and that neither the instruction nor a picture shows, as sentences."""
     facts: Mapping[str, Question] = field(default_factory=dict)
     """Questions by id."""
     order: Mapping[str, Subgoal] = field(default_factory=dict)

@@ -24,7 +24,7 @@ from .settings import QUICK, CertifySettings
 from .settings import lower_bound as lower_bound  # for those that judge rates
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Certified:
     """A certificate with the scene and the witness that it is about. The scene is empty if it was never built."""
 
@@ -33,6 +33,11 @@ class Certified:
     witness: Actions
     digest: str
     """Hash of the physics state at the end of the witness."""
+
+    def __repr__(self) -> str:
+        made = [check.passed for check in self.certificate.checks if check.passed is not None]
+        checks = f"{sum(made)} of {len(made)} checks passed"
+        return f"Certified({self.certificate.verdict}: {checks}, witness of {len(self.witness)} actions)"
 
     def _repr_html_(self) -> str:
         """Its checks, in a notebook."""

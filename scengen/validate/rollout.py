@@ -32,7 +32,7 @@ AT_REST = "everything came to rest without reaching the goal"
 """Reason of an episode that was simulated to rest."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Rollout:
     """Result of a rollout."""
 
@@ -52,6 +52,10 @@ class Rollout:
     @property
     def solved(self) -> bool:
         return self.outcome == "success"
+
+    def __repr__(self) -> str:
+        why = f": {self.reason}" if self.reason else ""
+        return f"Rollout({self.outcome}{why}, {self.seconds:.2f} s, {len(self.actions)} actions)"
 
     def _repr_html_(self) -> str:
         """Its result, in a notebook."""

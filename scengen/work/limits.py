@@ -10,6 +10,7 @@ MAX_SETTINGS = {
     "chunk": 1000,
     "comparisons": 1_000_000,
     "epochs": 1_000_000,
+    "patience": 10_000,
     "films": 100_000,
     "explore": 100,
     "first": 1_000_000_000,

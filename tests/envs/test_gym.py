@@ -56,7 +56,7 @@ def test_a_certified_pool_of_every_task_comes_with_scengen():
     assert sorted(pool.task for pool in pools) == sorted(list_tasks())
     assert all(pool.split == "id" and 3 <= len(pool) <= 6 for pool in pools)
     assert sum(file.stat().st_size for file in REFERENCES.rglob("*") if file.is_file()) < 8e6
-    assert {folder for folder in members(REFERENCES)} == {str(reference_pool(name)) for name in list_tasks()}
+    assert set(members(REFERENCES)) == {str(reference_pool(name)) for name in list_tasks()}
 
 
 def test_learners_see_the_scene_unless_they_ask_for_less():
@@ -72,7 +72,7 @@ def test_learners_see_the_scene_unless_they_ask_for_less():
 
 
 def test_readings_are_found_by_their_names(env):
-    seen, info = env.reset(seed=1)
+    seen, _ = env.reset(seed=1)
     plain, row = env.unwrapped, Pool.open(REFERENCE).at(1)
     tile, height = plain.entry("tile_0_pos"), plain.entry("tile_0_pos.z")
     assert tile.of(seen) == pytest.approx(plain.world.pos("tile_0"), abs=1e-4) and height.of(seen) == tile.of(seen)[2:]

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from ...intake.asset import MeshAsset
 
 
+MAX_FILLED = 1.1
+"""Volume of the pieces over that of the mesh above which a remark says that hollows are filled in part."""
 _NAMES = ("name", "to", "mesh", "json")
 """Settings that say what to do and where the list goes. All others are about an imported mesh."""
 
@@ -120,14 +122,17 @@ def _import_mesh(settings: AssetSettings, folder: Path) -> int:
 def _write(taken: "MeshAsset", figures: dict[str, Any], folder: Path) -> None:
     """Write the files of an asset. The figures come last: they vouch for the others."""
     from ...intake.preview import preview
+    from ...intake.urdf import files
 
+    for name, content in files(taken.prop):
+        write(folder / name, content)
     write(folder / "asset.xml", taken.xml)
     try:
         write(folder / "preview.png", render.encode(preview(taken.prop), "png"))
-        names = "asset.xml, asset.json and preview.png"
+        names = "asset.xml, asset.urdf with its meshes, asset.json and preview.png"
     except render.NoPictures as error:
         remark(f"{folder} has no preview.png: {error}")
-        names = "asset.xml and asset.json"
+        names = "asset.xml, asset.urdf with its meshes, and asset.json"
     write(folder / "asset.json", json.dumps(figures, indent=1) + "\n")
     say(f"wrote {names} in {folder}")
 
@@ -151,6 +156,13 @@ def _report(figures: dict[str, Any]) -> int:
         f"at {1000 * rest['speed']:.2f} mm/s at most"
     )
     say(_about_sides(figures))
+    if colours := figures["colours"]:
+        say(f"{colours} colour{'s' * (colours > 1)} of the file in pictures; MuJoCo's text holds no textures")
+    if count >= figures["settings"]["pieces"] > 1 or error["volume"] > MAX_FILLED:
+        limit = ", the limit," if count >= figures["settings"]["pieces"] > 1 else ""
+        what = f"{count} piece{'s' * (count > 1)}{limit} with {error['volume']:.2f} times the volume"
+        hollow = "a hollow asset with the sizes of yours (cup, bowl, dish, bin: scengen asset)"
+        remark(f"{what}: hollows are narrower than in the mesh; allow more pieces=, a smaller error=, or take {hollow}")
     if not is_accurate:
         say(f"MISSED: the error of {1000 * tolerance:g} mm; allow more pieces or a larger error")
     if not rest["rests"]:
