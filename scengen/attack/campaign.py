@@ -15,12 +15,11 @@ from ..pool.names import Name
 from ..samplers.task import Task
 from ..scenario import Answer, Plan, Scenario
 from ..sim.world import World
-from ..validate.certify import lower_bound
 from ..validate.identity import source_sha256
 from ..validate.playable import scene_errors
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
-from ..validate.settings import FEWEST
+from ..validate.settings import FEWEST, lower_bound
 from ..validate.verify.claims import alike
 from ..work.fingerprint import fingerprint
 from ..work.limits import at_least

@@ -32,10 +32,9 @@ from ..samplers.split import ID as TRAINING
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
-from ..validate.certify import lower_bound
 from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
-from ..validate.settings import Robust
+from ..validate.settings import Robust, lower_bound
 from ..validate.verify.claims import passed_filter
 from ..work.machine import memory_bounded
 from ..work.plain import open_plain
