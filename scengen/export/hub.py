@@ -24,7 +24,7 @@ from ..pool import Pool
 from ..pool.manifest import MANIFEST
 from ..samplers.split import ID
 from ..work.printed import printable
-from ..work.targets import appearing, check_unfinished, try_folder
+from ..work.targets import appearing
 
 CARD_FILE = "README.md"
 """Name of the file that the Hub reads as the dataset card."""
@@ -213,17 +213,6 @@ class Tally:
     def robust(self) -> str:
         """Successes of the oracle under jitter in the worst scenario, and their bound."""
         return Markdown(f"{self.worst['solved']} of {self.worst['runs']} (> {self.worst['bound']:.0%})")
-
-
-def check_target(to: str) -> None:
-    """Raise `BadConfig` unless a folder is new or empty, and can be written."""
-    path = Path(to)
-    if path.is_dir() and any(path.iterdir()):
-        raise BadConfig(f"{to} is not empty; delete it, or name another folder")
-    if not path.name:
-        raise BadConfig(f"to = {to}; name a new folder for the data set")
-    check_unfinished(path)
-    try_folder(to)
 
 
 def check_pools(pools: Sequence[Pool]) -> None:

@@ -113,6 +113,17 @@ def write(path: Path, content: str | bytes) -> None:
         raise refused(path, error) from None
 
 
+def check_new_folder(to: str) -> None:
+    """Raise `BadConfig` unless a folder is new or empty, and can be written."""
+    path = Path(to)
+    if path.is_dir() and any(path.iterdir()):
+        raise BadConfig(f"{to} is not empty; delete it, or name another folder")
+    if not path.name:
+        raise BadConfig(f"to = {to}; name a new folder")
+    check_unfinished(path)
+    try_folder(to)
+
+
 def unfinished(to: Path | str) -> Path:
     """Path of a file or folder while it is written."""
     return Path(f"{to}.unfinished")

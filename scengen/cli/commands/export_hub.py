@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ...attack.check import attacked
 from ...errors import BadConfig, PoolError, cut
-from ...export.hub import DatasetCard, PublishedPool, check_pools, check_target, own_license, publish
+from ...export.hub import DatasetCard, PublishedPool, check_pools, own_license, publish
 from ...pool import Pool
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
@@ -15,6 +15,7 @@ from ...validate.verify.recheck import LEVELS
 from ...work.limits import at_least
 from ...work.parallel import Workers
 from ...work.printed import printable
+from ...work.targets import check_new_folder
 from . import OK, Arguments, err, say, several
 from .settings import read
 from .verify import verified, without_expired
@@ -44,7 +45,7 @@ def command(arguments: Arguments) -> int:
     for name in ("title", "license"):
         if (text := getattr(settings, name)) is not None and (not text.strip() or printable(text) != text):
             raise BadConfig(f"{name} = {cut(repr(text))}; it must be one line of text without control characters")
-    check_target(settings.to)
+    check_new_folder(settings.to)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
     check_pools(pools)
     seed = secrets.randbelow(2**32)
