@@ -7,7 +7,7 @@ from scengen.pictures.film import Take, strip
 from scengen.pictures.render import encode
 from scengen.pictures.view import NoDisplay, view
 
-POOL = Path(__file__).parents[1] / "generated" / "reference"  # six scenarios that come with the repository
+POOL = scengen.reference_pool("domino_single")  # scenarios that come with scengen
 PICTURE = Path("generated/examples/look.png")
 
 pool = scengen.Pool.open(POOL)

@@ -2,13 +2,13 @@
 height that suits the tiles of training. Prints success rates: on the axis, the hand passes over the low first tile."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
+import scengen
 from scengen.cli import run
 
-ID, AXIS = Path(__file__).parents[1] / "generated" / "reference", "generated/examples/low_starter"
+ID, AXIS = scengen.reference_pool("domino_single"), "generated/examples/low_starter"
 
 
 class Habit:

@@ -1,17 +1,15 @@
 """Step sixteen environments at once, in the threads of one process. Prints shapes, scenarios and speed."""
 
 import time
-from pathlib import Path
 
 import gymnasium
 
 import scengen.envs.gym  # noqa: F401  (registers the tasks)
 
-POOL = Path(__file__).parents[1] / "generated" / "reference"
 STEPS = 200
 
-envs = gymnasium.make_vec("scengen/domino_single-v2", num_envs=16, pool=str(POOL), observations=["object-state"])
-observations, infos = envs.reset(seed=0, options={"labels": True})  # slots take the scenarios of the pool in turn
+envs = gymnasium.make_vec("scengen/domino_single-v2", num_envs=16, observations=["object-state"])
+observations, infos = envs.reset(seed=0, options={"labels": True})  # those that come with scengen, in turn; or pool=FOLDER
 print(f"scenarios {', '.join(infos['scenario'][:6])} and so on")
 print(f"object-state {observations['object-state'].shape}, actions {envs.action_space.shape}")
 

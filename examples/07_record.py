@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pyarrow.parquet as parquet
 
+import scengen
 from scengen.cli import run
 
-POOL = Path(__file__).parents[1] / "generated" / "reference"
+POOL = scengen.reference_pool("domino_single")
 DATA = Path("generated/examples/recording")
 
 shutil.rmtree(DATA, ignore_errors=True)

@@ -2,11 +2,11 @@
 So few demonstrations show the steps, not a good policy; docs/policies.md has the usual numbers and other learners."""
 
 import sys
-from pathlib import Path
 
+import scengen
 from scengen.cli import run
 
-POOL, FOLDER = Path(__file__).parents[1] / "generated" / "reference", "generated/examples"
+POOL, FOLDER = scengen.reference_pool("domino_single"), "generated/examples"
 COMMANDS = [
     f"demos task=domino_single n=10 styles=[nominal] apart={POOL} to={FOLDER}/demos",  # none of a scenario of the pool
     f"train policy=bc data={FOLDER}/demos members=1 epochs=60 to={FOLDER}/policy",

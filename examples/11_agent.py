@@ -6,10 +6,10 @@ import re
 import sys
 import threading
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from pathlib import Path
 
 import numpy as np
 
+import scengen
 from scengen.cli import run
 
 
@@ -34,6 +34,6 @@ class Server(BaseHTTPRequestHandler):
 
 server = HTTPServer(("127.0.0.1", 0), Server)
 threading.Thread(target=server.serve_forever, daemon=True).start()
-port, pool = server.server_port, Path(__file__).parents[1] / "generated" / "reference"
+port, pool = server.server_port, scengen.reference_pool("domino_single")
 command = f"agent stage=3 mode=poses pictures=false model=mine seeds=2 to=generated/examples/agent-{port}"
 sys.exit(run([*command.split(), f"url=http://127.0.0.1:{port}/v1", f"pool={pool}"]))

@@ -25,6 +25,7 @@ if sys.platform == "linux" and not {"MUJOCO_GL", "DISPLAY"} & os.environ.keys():
 if TYPE_CHECKING:
     from .certificate import Certificate
     from .compose import load_task
+    from .envs.pools import reference_pool
     from .params import param
     from .pool import Pool
     from .samplers.task import Draw, Task
@@ -46,6 +47,7 @@ __all__ = [
     "list_tasks",
     "load_task",
     "param",
+    "reference_pool",
     "replay",
     "run",
 ]
@@ -62,6 +64,7 @@ _HOME = {
     "list_tasks": ("samplers.task_files", "tasks"),
     "load_task": ("compose", "load_task"),
     "param": ("params", "param"),
+    "reference_pool": ("envs.pools", "reference_pool"),
     "replay": ("validate.rollout", "replay"),
     "run": ("validate.rollout", "run"),
 }
@@ -70,6 +73,10 @@ one."""
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version  # here, because it takes 20 ms
+
+        return version(__name__)
     if name not in _HOME:
         raise AttributeError(f"module 'scengen' has no attribute {name!r}; public names: {', '.join(__all__)}")
     module, inner = _HOME[name]
@@ -77,4 +84,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, "__version__"})

@@ -37,6 +37,7 @@ from .samplers.task_files import (
     packages,
     search_path,
     tasks,
+    unread,
 )
 from .validate.settings import CertifySettings
 from .work.typed import typed
@@ -278,6 +279,8 @@ def _check_override(verb: str, text: str) -> None:
                 raise BadConfig(
                     f"{quoted}: there is no folder {cut(str(folder))}; give one that holds task/<task>.yaml"
                 )
+            if why := unread(str(folder)):
+                raise BadConfig(f"{quoted}: {why}")
     in_group = key in ("task", "certify", "executor") and key in groups(verb)
     if in_group and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
         raise BadConfig(f"{quoted}: expected the name of a file of conf/{key} without .yaml; {_files_of(key)}")

@@ -14,9 +14,11 @@ from scengen.pictures import render
 from scengen.pool import Pool
 
 ROOT = Path(__file__).parents[1]
-REFERENCE = Path(os.environ.get("SCENGEN_REFERENCE", ROOT / "generated" / "reference"))
+REFERENCES = ROOT / "generated" / "reference"
+"""The pools that come with scengen, one for each task."""
+REFERENCE = Path(os.environ.get("SCENGEN_REFERENCE", REFERENCES / "domino_single-id"))
 """The small pool that tests read. Under another MuJoCo than that of the repository's, `make stacks` makes one."""
-STORED_MUJOCO = json.loads((ROOT / "generated" / "reference" / "manifest.json").read_text())["versions"]["mujoco"]
+STORED_MUJOCO = json.loads((REFERENCES / "domino_single-id" / "manifest.json").read_text())["versions"]["mujoco"]
 of_stored_pools = pytest.mark.skipif(
     mujoco.__version__ != STORED_MUJOCO, reason=f"the pools of the repository were made with mujoco {STORED_MUJOCO}"
 )

@@ -1,6 +1,6 @@
 """Write large pools without certifying, and measure the cost of each command that reads pools.
 
-    python tools/large_pools.py write generated/reference 100000 /tmp/large [scenes]
+    python tools/large_pools.py write generated/reference/domino_single-id 100000 /tmp/large [scenes]
     python tools/large_pools.py measure POOL [POOL ...]
 
 `write` draws scenarios as in a run, with copies of certificates. Each row has the id, the parameters and the twin that

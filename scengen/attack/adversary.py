@@ -11,6 +11,7 @@ from . import draws
 from .clock import CLOCK, timed
 from .detours import DETOUR, detours
 from .evidence import CausalContacts, Hit, TierRate, hit, rates
+from .feel import FEEL, felt
 from .macros import Macro
 from .memories import MEMORY, remembered
 from .player import Attempt, Node, Played, Player
@@ -36,6 +37,7 @@ TIER_SHARES = {
     SERVO: 0.20,
     RETRY: 0.30,
     DETOUR: 0.14,
+    FEEL: 0.14,
     FOREIGN: 0.08,
     WITNESS: 0.14,
     RANDOM: 0.14,
@@ -230,6 +232,7 @@ class Attack:
             SERVO: servo,
             RETRY: retries,
             DETOUR: detours,
+            FEEL: felt,
             FOREIGN: foreign,
             WITNESS: perturbed,
         }

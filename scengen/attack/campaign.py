@@ -20,6 +20,7 @@ from ..validate.identity import source_sha256
 from ..validate.playable import scene_errors
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
+from ..validate.settings import FEWEST
 from ..validate.verify.claims import alike
 from ..work.fingerprint import fingerprint
 from ..work.limits import at_least
@@ -36,7 +37,7 @@ from .variations import FOREIGN
 
 MAX_HIT = 100_000_000
 """Size of the largest file of a hit that is read [bytes]: an hour of two arms has 20 MB."""
-GRAMMAR = 6
+GRAMMAR = 7
 """Version of macros and tiers: reports of different versions are not comparable."""
 HITS_FOLDER = "hits"
 """Folder of the hits in a pool."""
@@ -183,7 +184,9 @@ class AttackReport:
             "priors": [{**asdict(prior), "bound": prior.bound} for prior in self.priors],
             "not_tried": [asdict(one) for one in self.untried],
             "lost": list(self.lost),
-            "hits": [{"name": hit.name, "refutes": hit.refutes, **hit.plain()} for hit in self.hits],
+            "hits": [
+                {"name": hit.name, "refutes": hit.refutes, "resumed": hit.resumed, **hit.plain()} for hit in self.hits
+            ],
         }
 
 
@@ -253,7 +256,18 @@ def attack(
                 replace(hit, task=task.name).store(folder)
             log.add(_record(result))
             progress(len(log.records), sum(len(record["hits"]) for record in log.records))
+        order = [one.scenario.id for one in subjects]
+        log.sort(lambda record: order.index(record["scenario"]))
         return _report(task, rules, subjects, log, folder, priors)
+
+
+def check_budget(setting: str, budget: int, scenarios: int) -> None:
+    """Raise `BadConfig` if a budget is too small to attack every scenario."""
+    if budget < (fewest := FEWEST * scenarios):
+        raise BadConfig(
+            f"{setting} = {budget} for {scenarios} scenarios; each attack plays a plan filtered and raw, which needs "
+            f"{fewest} rollouts; give {setting}={fewest} or more, or fewer scenarios"
+        )
 
 
 def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:
@@ -283,7 +297,9 @@ def drawn(task: Task, split: str, n: int, seed: int) -> list[Subject]:
 
 def certified(task: Task, rows: Iterable[PoolRow]) -> list[Subject]:
     """Certified scenarios, with their witnesses."""
-    return [Subject(task.scenario(r.params), r.scene_xml, r.embodiment, r.horizon, r.witness, r.name) for r in rows]
+    return [
+        Subject(task.scenario(r.params, r.split), r.scene_xml, r.embodiment, r.horizon, r.witness, r.name) for r in rows
+    ]
 
 
 def store_in_pool(report: AttackReport, folder: Path) -> dict[str, Any]:
@@ -442,16 +458,16 @@ def _record(result: AttackResult) -> dict[str, Any]:
 def _report(
     task: Task, rules: Rules, subjects: Sequence[Subject], log: Log, folder: Path, priors: tuple[Prior, ...]
 ) -> AttackReport:
-    order = [one.scenario.id for one in subjects]
-    records = sorted(log.records, key=lambda record: order.index(record["scenario"]))
+    records = log.records
     counts = [TierRate(**rate) for record in records for rate in record["rates"]]
     hits = [Hit.load(folder / f"{name}.npz") for record in records for name in record["hits"]]
     untried = tuple(UntriedShortcut(**one) for record in records for one in record["untried"])
     cpu = sum(record["cpu"] for record in records)
     lost = tuple(f"{record['scenario']} {record['lost']}" for record in records if record["lost"])
+    order = tuple(one.scenario.id for one in subjects)
     sorted_rates = tuple(_sorted(rates(counts)))
     return AttackReport(
-        task.name, task.version, rules, tuple(order), sorted_rates, tuple(hits), priors, untried, lost, folder, cpu
+        task.name, task.version, rules, order, sorted_rates, tuple(hits), priors, untried, lost, folder, cpu
     )
 
 

@@ -28,12 +28,15 @@ from ..pool.untrusted import (
     demand,
     read_json,
 )
+from ..samplers.split import ID as TRAINING
 from ..samplers.task import Task
+from ..scenario import Scenario
 from ..sim.world import World
 from ..validate.certify import lower_bound
 from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
 from ..validate.settings import Robust
+from ..validate.verify.claims import passed_filter
 from ..work.machine import memory_bounded
 from ..work.plain import open_plain
 from ..work.targets import write
@@ -44,6 +47,10 @@ from .variations import at_another_pace
 VARIED_RUNS = 40
 """Number of varied runs of the oracle in which a causal contact has to occur. A contact that is missing in 5 % of runs
 passes with a probability of 13 %."""
+
+
+RESUMED = " from a state of the witness on"
+"""Remark about a filtered hit that `Hit.resumed` tells of."""
 
 
 def spelled(raw: bool) -> str:
@@ -83,11 +90,19 @@ class Hit:
     """Version of the task that was attacked; None in hits of earlier releases, which do not store it."""
     otherwise: str = ""
     """Means that it lacks, joined by semicolons. Under the strict rules none is lacking."""
+    conditions: str = ""
+    """Conditions of control under which the scenario is posed, as a split names them; empty for the usual ones."""
 
     @property
     def refutes(self) -> bool:
         """Whether the hit bypasses the point of the task; if not, it only shows that the goal is accessible."""
         return bool(self.lacks or self.otherwise)
+
+    @property
+    def resumed(self) -> bool:
+        """Whether it was filtered from a state of the witness on, where the filter started at rest: from the start of
+        the episode, the filter cannot give its actions."""
+        return not self.raw and not passed_filter(self.actions)
 
     @property
     def name(self) -> str:
@@ -97,11 +112,13 @@ class Hit:
     def __str__(self) -> str:
         contacts = ", without " + ", ".join(f"{one} - {other}" for one, other in self.lacks) if self.lacks else ""
         otherwise = f" [lacks: {self.otherwise}]" if self.otherwise else ""
-        return f"by {self.tier}, {spelled(self.raw)}{contacts}{otherwise}: {self.plan}"
+        how = f"{spelled(self.raw)}{RESUMED if self.resumed else ''}"
+        return f"by {self.tier}, {how}{contacts}{otherwise}: {self.plan}"
 
     def plain(self) -> dict[str, Any]:
         """All fields but actions and parameters, as plain data."""
-        kept = {key: value for key, value in vars(self).items() if key not in ("actions", "params")}
+        left_out = ("actions", "params", *([] if self.conditions else ["conditions"]))
+        kept = {key: value for key, value in vars(self).items() if key not in left_out}
         return {**kept, "lacks": [list(pair) for pair in self.lacks], "unmoved": list(self.unmoved)}
 
     def store(self, folder: Path) -> None:
@@ -141,7 +158,7 @@ def _plain_hit(about: Any) -> dict[str, Any]:
     Raises:
         ValueError: one of them is missing, unknown, or not what a hit has.
     """
-    about = {"task_version": None, "otherwise": "", **check_mapping("what it says", about)}
+    about = {"task_version": None, "otherwise": "", "conditions": "", **check_mapping("what it says", about)}
     known = [one.name for one in fields(Hit) if one.name != "actions"]
     for name in known:
         demand(name in about, f"it lacks {name}")
@@ -153,6 +170,7 @@ def _plain_hit(about: Any) -> dict[str, Any]:
     check_text("plan", about["plan"], 10_000)
     check_text("otherwise", about["otherwise"], 10_000)
     demand(_is_number(about["seconds"]) and 0 <= about["seconds"] <= MAX_HORIZON, "seconds is not a time")
+    check_text("conditions", about["conditions"], 1000)
     check_match("digest", about["digest"], SHORT_HASH)
     check_text("task", about["task"], 100)
     demand(about["rules"] in RULES, "rules are neither strict nor paper")
@@ -176,7 +194,9 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-OTHER_SCENARIO = "the scenario's id does not belong to its parameters; one of a pool with scans needs pool=FOLDER too"
+OTHER_SCENARIO = (
+    "the scenario's id does not belong to its parameters and conditions; one of a pool with scans needs pool=FOLDER too"
+)
 """Reason why a hit cannot be examined."""
 
 
@@ -190,6 +210,15 @@ class Replayed:
     """Whether the replay ends in the bits that the hit says."""
 
 
+def scenario_of(hit: Hit, task: Task) -> Scenario:
+    """The scenario of a hit, under its conditions.
+
+    Raises:
+        ScengenError: the parameters, or the conditions, are not those of the task.
+    """
+    return task.scenario(hit.params, hit.conditions or TRAINING)
+
+
 def replayed(hit: Hit, task: Task) -> Replayed:
     """Replay a stored hit in the scene that is built from its parameters, and compare what it says.
 
@@ -199,8 +228,8 @@ def replayed(hit: Hit, task: Task) -> Replayed:
     Raises:
         ScengenError: the parameters are not those of the task.
     """
-    scenario = task.scenario(hit.params)
-    if scenario.id != hit.scenario:
+    scenario = scenario_of(hit, task)
+    if scenario.id != hit.scenario or str(scenario.conditions or "") != hit.conditions:
         return Replayed(OTHER_SCENARIO)
     world = world_of(scenario, task.embodiment)
     start = starts(world)
@@ -306,6 +335,7 @@ def hit(
         rules=player.rules,
         task_version=player.scenario.VERSION,
         otherwise=again.lacks,
+        conditions=str(player.scenario.conditions or ""),
     )
 
 

@@ -25,6 +25,11 @@
 | ease    |          | displacement [m]; the hand stops while the jaw opens by itself               |
 | roll    | body     | direction and elevation of a hand that holds the body on its side [rad]      |
 | bring   | body     | goal of its centre [m], height [m], turn [rad], detour [m], drop [m]         |
+| settle  | body     | displacement of its first place [m], number of tries                         |
+| slide   |          | directions of the surface and of the slide (unit vectors), seconds           |
+| fling   | body     | goal of its centre [m], speed [m/s], distance at which the hand opens [m]    |
+| slip    |          | number of slips, control periods off and on                                  |
+| lean    |          | axis (unit vector), angle [rad], displacement [m], speed [m/s]               |
 | along   | body     | turn of the hand from the body's way in the witness [rad], height [m]        |
 
 Shares run from -1 to 1 over a face and from 0 to 1 over a height. `push`, `place`, `press` use the body in the hand.
@@ -46,7 +51,7 @@ from ..sim.world import World
 from ..skills import suction
 from ..skills.jaw import grasp, release
 from ..skills.motion import CLOSED, OPEN, Pace, alone, closing_along, go_to, hold, push, retreat, turn_to
-from . import plans
+from . import plans, touch
 from .solids import Solid, held
 
 FREE_PACE = Pace(0.30, 0.02, give_up=2.5)
@@ -300,16 +305,43 @@ def _ease(field: MacroContext, macro: Macro) -> Plan:
 
 
 def _roll(field: MacroContext, macro: Macro) -> Plan:
-    if held(field.arm) != macro.target:
-        raise GaveUp(f"{macro.target} is not in the hand")
+    _check_held(field, macro)
     yield from plans.turn_about(field.arm, macro.target, plans.on_its_side(*macro.numbers))
 
 
 def _bring(field: MacroContext, macro: Macro) -> Plan:
     x, y, z, over, skew, aside, drop = macro.numbers
-    if held(field.arm) != macro.target:
-        raise GaveUp(f"{macro.target} is not in the hand")
+    _check_held(field, macro)
     yield from plans.carry_to(field.arm, macro.target, [x, y, z], over, skew, drop, aside)
+
+
+# --- plans of a hand that feels -------------------------------------------------------------------
+
+
+def _settle(field: MacroContext, macro: Macro) -> Plan:
+    *shift, tries = macro.numbers
+    _check_held(field, macro)
+    yield from touch.settle(field.arm, macro.target, shift, round(tries))
+
+
+def _slide(field: MacroContext, macro: Macro) -> Plan:
+    against, along, (seconds,) = macro.numbers[:3], macro.numbers[3:6], macro.numbers[6:]
+    return touch.slide(field.arm, against, along, seconds)
+
+
+def _fling(field: MacroContext, macro: Macro) -> Plan:
+    *goal, speed, early = macro.numbers
+    _check_held(field, macro)
+    yield from touch.fling(field.arm, goal, speed, early, macro.target)
+
+
+def _slip(field: MacroContext, macro: Macro) -> Plan:
+    return touch.slip(field.arm, *map(round, macro.numbers))
+
+
+def _lean(field: MacroContext, macro: Macro) -> Plan:
+    axis, (angle,), way, (speed,) = macro.numbers[:3], macro.numbers[3:4], macro.numbers[4:7], macro.numbers[7:]
+    return touch.lean(field.arm, axis, angle, way, speed)
 
 
 KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
@@ -337,11 +369,22 @@ KINDS: Mapping[str, Callable[[MacroContext, Macro], Plan]] = {
     "ease": _ease,
     "roll": _roll,
     "bring": _bring,
+    "settle": _settle,
+    "slide": _slide,
+    "fling": _fling,
+    "slip": _slip,
+    "lean": _lean,
 }
 """The plan of each kind of macro."""
 
 
 # --- parts of plans -----------------------------------------------------------------------------
+
+
+def _check_held(field: MacroContext, macro: Macro) -> None:
+    """Raise `GaveUp` if the target is not in the hand."""
+    if held(field.arm) != macro.target:
+        raise GaveUp(f"{macro.target} is not in the hand")
 
 
 def _rise(arm: Arm, height: float) -> Plan:

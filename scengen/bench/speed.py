@@ -20,6 +20,7 @@ from rich.table import Table
 from .. import compose
 from ..control.loop import ACTION, Loop
 from ..envs.gym import PoolEnv
+from ..envs.observations import PROPRIOCEPTION
 from ..episode import Actions, Episode
 from ..pictures.render import NoPictures
 from ..pool import Pool, PoolRow
@@ -215,7 +216,7 @@ def two_arms(repeats: int) -> dict[str, Measure]:
 def gym_costs(repeats: int) -> dict[str, Measure]:
     """Costs of the Gymnasium environment without cameras: its step over bare mj_step calls, and its reset [ms]."""
     with _pool() as pool:
-        env, row = PoolEnv("domino_single", pool.folder), next(pool.rows())
+        env, row = PoolEnv("domino_single", pool.folder, PROPRIOCEPTION), next(pool.rows())
     env.reset()
     resets = [1000 * _seconds(env.reset) for _ in range(repeats)]
     ratios = alternated([_steps_of(env, row.witness), _bare(stored_world(row), row.witness)], repeats)
@@ -230,7 +231,7 @@ def costs(repeats: int) -> dict[str, float]:
     with _pool() as pool:
         row = next(pool.rows())
         actions = row.witness
-        bare = PoolEnv("domino_single", pool.folder)
+        bare = PoolEnv("domino_single", pool.folder, PROPRIOCEPTION)
         seeing = PoolEnv("domino_single", pool.folder, ["rgb_exo_right_cam"])
     brief = actions[:CAMERA_PERIODS]
     world = stored_world(row)

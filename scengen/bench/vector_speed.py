@@ -7,6 +7,7 @@ import numpy as np
 from gymnasium.vector import AsyncVectorEnv, VectorEnv
 
 from ..envs.gym import PoolEnv
+from ..envs.observations import PROPRIOCEPTION
 from ..envs.vector import PoolVectorEnv
 from ..episode import Actions
 from ..pool import PoolRow
@@ -26,9 +27,12 @@ def vector_ratios(folder: str, row: PoolRow, repeats: int) -> dict[str, Measure]
         folder: pool with the scenario of `row` alone.
     """
     task, actions = row.task, row.witness[:PERIODS]
-    processes = AsyncVectorEnv([lambda: PoolEnv(task, folder)] * SLOTS)  # before any thread: it copies this process
-    one, two = PoolVectorEnv(task, folder, SLOTS, 1), PoolVectorEnv(task, folder, SLOTS, 2)
-    every, single = PoolVectorEnv(task, folder, SLOTS), PoolEnv(task, folder)
+    seen = {"observations": PROPRIOCEPTION}
+    processes = AsyncVectorEnv(
+        [lambda: PoolEnv(task, folder, **seen)] * SLOTS
+    )  # before any thread: it copies this process
+    one, two = (PoolVectorEnv(task, folder, SLOTS, threads, **seen) for threads in (1, 2))
+    every, single = PoolVectorEnv(task, folder, SLOTS, **seen), PoolEnv(task, folder, **seen)
     try:
         apart = alternated([_stepping(one, actions), _bare(row, actions)], repeats)
         rates = [_rates((two, every, processes), single, actions) for _ in range(repeats + 1)][1:]

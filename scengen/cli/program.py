@@ -142,8 +142,13 @@ def _interrupted(argv: Sequence[str]) -> int:
 
 def _status_of(error: Exception) -> int:
     """Print an error in one line. Returns the exit status."""
+    from ..work.foreign import place_of
+
+    place = place_of(error)
+    if isinstance(error, ForeignCode):
+        return _failed(str(error), _write_traceback(error))
     if isinstance(error, ScengenError):
-        return _failed(str(error), _write_traceback(error) if isinstance(error, ForeignCode) else "")
+        return _failed(f"{place}: {error}" if place else str(error))
     if isinstance(error, BrokenPipeError):
         sys.stderr.close()
         return OK
@@ -158,7 +163,7 @@ def _status_of(error: Exception) -> int:
     if "mujoco" not in sys.modules and "mujoco" in failed and (chosen := os.environ.get("MUJOCO_GL")):
         remedy = "install what it needs (on Debian libegl1 libgl1 libosmesa6), or unset MUJOCO_GL"
         return _failed(f"MuJoCo cannot draw with MUJOCO_GL={cut(chosen)} ({cut(str(error), 80)}); {remedy}")
-    return _unforeseen(error)
+    return _unforeseen(error, place)
 
 
 def _run(argv: Sequence[str], signals: Signals | None) -> int:
@@ -286,11 +291,17 @@ def _failed(text: str, file: str = "") -> int:
     return BAD_INPUT
 
 
-def _unforeseen(error: Exception) -> int:
-    """Print an error that no check has foreseen, as one line too."""
-    what = cut(" ".join(str(error).split()))
+def _unforeseen(error: Exception, place: str) -> int:
+    """Print an error that no check has foreseen, as one line too.
+
+    Args:
+        place: place in code that is not scengen's from which it comes; empty if there is none.
+    """
+    what = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
     file = _write_traceback(error) or "(no file: no room)"
-    return _failed(f"unforeseen {type(error).__name__}: {what}; please report it", file)
+    if place:
+        return _failed(f"{place}: {what}; this is not scengen's code", file)
+    return _failed(f"unforeseen {what}; please report it", file)
 
 
 def _write_traceback(error: BaseException) -> str:

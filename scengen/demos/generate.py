@@ -34,7 +34,7 @@ from ..validate.certify import Trial
 from ..validate.labels import labels_of_draw, labels_of_task, made_with
 from ..validate.rollout import Rollout, run
 from ..validate.settings import CertifySettings
-from ..work.limits import at_least
+from ..work.limits import at_least, check_count
 from ..work.parallel import Limits, Workers
 from .styles import NOMINAL, RECOVER, VARIED, check_styles, chosen, in_style
 
@@ -75,8 +75,10 @@ class DemosSettings:
     def check(self, task: Task) -> None:
         """Raise `ScengenError` for a setting that makes no sense for this task."""
         task.shifts(self.split)
-        task.design(self.sampler)
         at_least(self, n=1, runs=1, seed=0, workers=1, limit=1, limit_seconds=1, limit_mb=200)
+        size = task.design(self.sampler).size
+        why = f"sampler={self.sampler} has {size} scenarios, with {self.runs} runs each"
+        check_count(self.n, self.limit, size and size * self.runs, why, "demonstrations")
         check_styles(self.styles)
         if not self.styles:
             raise BadConfig("styles = []; give at least one style, such as styles=[varied]")

@@ -1,5 +1,7 @@
 """Gymnasium environments over pools: `gymnasium.make("scengen/domino_single-v2", pool="generated/id")`.
 
+Without `pool=` they play three certified training scenarios that come with scengen, to try a task.
+
 Importing this module registers every task. `gymnasium.make("scengen.envs.gym:scengen/...")` imports it by itself. The
 number in an id is the version of the task (`Scenario.VERSION`). `-v0` names the installed version, too, with a warning.
 An environment plays the certified scenarios of a pool, with the scene text, the physics and the controller of the
@@ -12,7 +14,7 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import gymnasium
@@ -44,16 +46,18 @@ from ..sim.world import World
 from ..validate.playable import stored_world
 from .object_state import ObjectState, bodies_of
 from .observations import (
+    Entry,
     Reading,
     Stream,
     cameras_of,
     check_names,
+    entries_of,
     privileged,
-    proprioception,
+    requested,
     streams_of,
     turns_pictures,
 )
-from .pools import Folders, chosen, located, rows_of
+from .pools import Folders, chosen, located, rows_of, scenes_drawn_otherwise
 
 Observation = dict[str, Reading]
 
@@ -113,7 +117,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     (`scengen.control.teleop`).
 
     Observations: a dictionary of the requested streams (`scengen.envs.observations`), float32; pictures are uint8.
-    `metadata["names"]` lists the entries of each stream. No observation contains a hidden parameter of a scenario.
+    By default they are the robot's own pose and `object-state`, poses and sizes of all bodies. `entry("tile_0_pos")`
+    is the place of a reading, and `legend` lists all of them. No observation contains a hidden parameter.
     Some scenarios are seen turned or mirrored (`Scenario.orientation`). Then every picture is turned, that of `render`
     included; actions and all other streams stay as they are. `seen_<body>_pos` is where the picture shows a body.
 
@@ -122,7 +127,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     second, which is simulated within the last step.
     `info` holds `success`, `is_success`, `time` [s], and at the end `reason` and `lacks`, the means of the task
     without which the goal was reached: nothing that identifies a scenario. After
-    `reset(options={"labels": True})` it also holds `scenario`, `scene_sha256`, `split` and `axes`, for evaluators.
+    `reset(options={"labels": True})` it also holds `scenario`, `scene_sha256`, `split`, `axes`, `instruction` and
+    `pool`, the folder, for evaluators.
 
     Threads may share an environment. Their calls run one after the other.
     """
@@ -154,8 +160,10 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
         Args:
             task: name of the task. Pools of other tasks are refused.
-            pool: folder of a pool, or several folders; or the scenarios of another environment of the task.
-            observations: names of streams and cameras, or one name; only these are computed. Default: proprioception.
+            pool: folder of a pool, or several folders; or the scenarios of another environment of the task. Default:
+                the scenarios of the task that come with scengen.
+            observations: names of streams and cameras, or one name; only these are computed. `state`, the default,
+                stands for proprioception and `object-state`, `pictures` for proprioception and all cameras.
                 Privileged streams are `object-state`, all poses, velocities and sizes in one vector
                 (`scengen.envs.object_state`), each reading in it, such as `<body>_pos` [m], and `seen_<body>_pos` [m]
                 if the family turns pictures.
@@ -197,8 +205,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         rows = rows_of(pool, task)
         self._arguments["pool"] = located(pool)
         self._rows = chosen(rows, scenario, split)
-        names = [observations] if isinstance(observations, str) else observations
-        names = proprioception(self.task.embodiment) if names is None else names
+        names = requested(observations, self.task.embodiment)
         streams, cameras = _requested(names, self.task, rows, lambda: self.scenario.orientation)
         self.observed = ObservationSettings(streams, cameras, width, height)
         shown = [] if render_mode is None else [cameras_of(self.task.embodiment).get(camera, camera)]
@@ -242,6 +249,44 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def cameras(self) -> tuple[str, ...]:
         """The paper's names of the cameras of the observation."""
         return tuple(self.observed.cameras)
+
+    @cached_property
+    def _entries(self) -> dict[str, Entry]:
+        return entries_of(self.metadata["names"])
+
+    def entry(self, name: str) -> Entry:
+        """Place of a reading such as `tile_0_pos`, or of a number such as `tile_0_pos.x`, in an observation.
+
+        `env.unwrapped.entry("tile_0_pos").of(observation)` is the reading.
+
+        Raises:
+            UnknownName: it is not observed.
+        """
+        reading, _, number = name.partition(".")
+        found = self._entries.get(reading)
+        if found is None or (number and number not in found.numbers):
+            known = [*self._entries, *(f"{reading}.{each}" for each in found.numbers)] if found else [*self._entries]
+            raise UnknownName("reading in these observations", name, known)
+        if not number:
+            return found
+        place = found.where.start + found.numbers.index(number)
+        return Entry(name, found.stream, slice(place, place + 1), ())
+
+    @property
+    def legend(self) -> str:
+        """Every reading in the observations, one in a line: its place, its name, its numbers and their unit."""
+        listed = {entry.stream for entry in self._entries.values()}
+        others = [f"{name} {space.shape}" for name, space in self.observed.space.items() if name not in listed]
+        return "\n".join([*map(str, self._entries.values()), *others])
+
+    @property
+    def max_episode_steps(self) -> int:
+        """Number of steps until the longest time limit of the pools."""
+        return self.steps_in(max(pool.manifest.task_node["horizon"] for pool in self._rows.pools))
+
+    def steps_in(self, seconds: float) -> int:
+        """Number of steps in a time [s], the last one begun."""
+        return int(np.ceil(seconds / (Loop.PERIOD * self.action_repeat) - 1e-9))
 
     def check_observations(self, names: Sequence[str]) -> None:
         """Raise `UnknownName` for the first name that is neither a stream nor a camera of the environment."""
@@ -370,12 +415,15 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:  # type: ignore[override]
-        if spec is not None and "pool" in spec.kwargs:
-            pool = spec.kwargs["pool"]
+        self._spec = spec and self.specified(spec)
+
+    def specified(self, spec: EnvSpec) -> EnvSpec:
+        """A specification with the environment's own time limit, and with folders as text."""
+        kwargs = dict(spec.kwargs)
+        if (pool := kwargs.get("pool")) is not None:
             many = isinstance(pool, Sequence) and not isinstance(pool, str)
-            folders = [str(folder) for folder in pool] if many else str(pool)
-            spec = replace(spec, kwargs={**spec.kwargs, "pool": folders})
-        self._spec = spec
+            kwargs["pool"] = [str(folder) for folder in pool] if many else str(pool)
+        return replace(spec, kwargs=kwargs, max_episode_steps=self.max_episode_steps)
 
     def _progress(self) -> dict[str, Any]:
         """Everything that a copy needs to continue, in addition to the arguments of `__init__`."""
@@ -481,6 +529,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Labels of the running scenario. A policy that sees them can memorise scenarios."""
         row = self._row
         labels = {"scenario": row.id, "split": row.split, "axes": list(row.axes), "scene_sha256": row.scene_sha256}
+        labels |= {"instruction": self.instruction, "pool": str(self._rows.folder_of(row.id))}
         return {**labels, "perturb": self.drawn.plain()} if self.perturbation else labels
 
 
@@ -550,7 +599,7 @@ def _requested(
     """
     streams, cameras = streams_of(task.embodiment), cameras_of(task.embodiment)
     if not set(names) <= {*streams, *cameras}:  # only then: finding the bodies takes time, it builds some scenes
-        bodies = bodies_of(task, (scene for (scene,) in rows.columns("scene_xml")))
+        bodies = bodies_of(task, scenes_drawn_otherwise(rows, task))
         state = ObjectState(bodies, len(hands(task.embodiment)))
         streams |= privileged(state, task.family, orientation)
         check_names(names, task.embodiment, streams)

@@ -15,7 +15,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from ..control.loop import Loop
 from ..errors import BadConfig
 from .gym import Observation, PoolEnv
 from .object_state import NAME
@@ -58,7 +57,7 @@ class LeRobotNames(gymnasium.ObservationWrapper[dict[str, Any], NDArray[np.float
     @property
     def _max_episode_steps(self) -> int:
         """Number of steps until the time limit. LeRobot reads it under this name."""
-        return int(np.ceil(self._pool_env.horizon / (Loop.PERIOD * self._pool_env.action_repeat) - 1e-9))
+        return self._pool_env.steps_in(self._pool_env.horizon)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

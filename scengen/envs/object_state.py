@@ -81,10 +81,26 @@ def bodies_of(task: Task, scenes: Iterable[str] = ()) -> Bodies:
         scenes: further scenes (MJCF), such as those of a pool that was drawn with other distributions.
     """
     found: dict[str, bool] = {}
-    for bodies in chain(map(_bodies_built, _variants(task)), map(_bodies_in_text, _distinct(scenes))):
+    for bodies in chain([_bodies_drawn(task)], map(_bodies_in_text, _distinct(scenes))):
         for name, moves in bodies.items():
             found[name] = found.get(name, False) or moves
     return {name: found[name] for name in sorted(found, key=_natural_key) if name not in COMMON_BODIES}
+
+
+_drawn = WeakKeyDictionary[type[Scenario], list[tuple[object, Bodies]]]()
+
+
+def _bodies_drawn(task: Task) -> Bodies:
+    """The bodies of all `_variants` of a task. They are found once: many environments of a task need them."""
+    known, spaces = _drawn.setdefault(task.family, []), (task.training, {n: a.replace for n, a in task.axes.items()})
+    for given, bodies in known:
+        if given == spaces:
+            return bodies
+    found: dict[str, bool] = {}
+    for bodies in map(_bodies_built, _variants(task)):
+        found |= {name: moves or found.get(name, False) for name, moves in bodies.items()}
+    known.append((spaces, found))
+    return found
 
 
 def all_bodies(several: Iterable[Bodies]) -> Bodies:

@@ -1,5 +1,8 @@
 """Streams of observations: the paper's streams under robosuite's names, each read only if it is requested.
 
+Three words stand for several streams: `state`, the default, for the robot's own pose and `object-state`; `pictures` for
+its own pose and all cameras; `proprioception` for its own pose alone.
+
 Shapes, units and names follow the paper's table of modalities. Images are (height, width, 3), first row on top. The
 table is for one arm. A second arm has the same streams, with `robot1_` in place of `robot0_` or as a prefix. An arm
 that the scene's events move has no streams and is visible in pictures only.
@@ -12,6 +15,7 @@ of the actions. For state-based policies `seen_<body>_pos` is the position that 
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import mujoco
@@ -219,10 +223,21 @@ def proprioception(embodiment: str) -> tuple[str, ...]:
 ALL = "+".join([JAW] * MAX_ARMS)
 """Embodiment that has all streams and cameras."""
 
+STATE, PICTURES, PROPRIOCEPTION = WORDS = ("state", "pictures", "proprioception")
+"""Words for several streams."""
+
+
+def requested(names: str | Iterable[str] | None, embodiment: str) -> tuple[str, ...]:
+    """Names of streams and cameras that some names and words stand for, each once; `state` for None."""
+    given = [names] if isinstance(names, str) else [STATE] if names is None else names
+    own = proprioception(embodiment)
+    words = {STATE: (*own, NAME), PICTURES: (*own, *cameras_of(embodiment)), PROPRIOCEPTION: own}
+    return tuple(dict.fromkeys(each for name in given for each in words.get(name, (name,))))
+
 
 def check_names(names: Sequence[str], embodiment: str, poses: Iterable[str]) -> None:
     """Raise `UnknownName` for the first name that is neither a stream nor a camera of the robot, nor in `poses`."""
-    known = [*streams_of(embodiment), *cameras_of(embodiment), *poses]
+    known = [*WORDS, *streams_of(embodiment), *cameras_of(embodiment), *poses]
     for name in names:
         if name not in known:
             raise UnknownName("observation", name, known)
@@ -235,6 +250,68 @@ MOVES = ("move_x", "move_y", "move_z", "turn_x", "turn_y", "turn_z", "gripper")
 def action_names(embodiment: str) -> tuple[str, ...]:
     """Names of the numbers of an action, such as `robot0_move_x`."""
     return tuple(f"{Names(number).arm}{move}" for number in range(len(hands(embodiment))) for move in MOVES)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Where a reading such as `tile_0_pos`, or one of its numbers such as `tile_0_pos.x`, lies in an observation."""
+
+    name: str
+    stream: str
+    """Name of the vector that holds it."""
+    where: slice
+    """Its place in the vector."""
+    numbers: tuple[str, ...]
+    """Names of its numbers, such as x, y and z; empty for a single number."""
+
+    def of(self, observation: Mapping[str, Reading]) -> Reading:
+        """The reading in an observation, shape (n,); in observations of m environments, shape (m, n)."""
+        return observation[self.stream][..., self.where]
+
+    @property
+    def unit(self) -> str:
+        """Unit of its numbers; empty for quaternions and for unknown readings."""
+        reading = self.name.partition(".")[0]
+        return next((unit for end, unit in UNITS.items() if reading.endswith(end)), "")
+
+    def __str__(self) -> str:
+        place, numbers = f"{self.stream}[{self.where.start}:{self.where.stop}]", self.numbers
+        several = numbers if len(numbers) < MANY else (numbers[0], "to", numbers[-1])
+        return " ".join([f"{place:24}", f"{self.name:28}", *several, self.unit]).rstrip()
+
+
+MANY = 5
+"""Number of numbers from which on a legend names the first and the last only."""
+UNITS = {
+    "joint_pos": "[rad]",
+    "joint_vel": "[rad/s]",
+    "gripper_qpos": "[m]",
+    "vel_lin": "[m/s]",
+    "vel_ang": "[rad/s]",
+    "pos": "[m]",
+    "box_low": "[m]",
+    "box_high": "[m]",
+    "force_torque": "[N], [N m]",
+    "force_torque_world": "[N]",
+}
+"""Units of readings by the ends of their names, longer ends first."""
+
+
+def entries_of(names: Mapping[str, Sequence[str]]) -> dict[str, Entry]:
+    """All readings in some vectors, by name.
+
+    Args:
+        names: full names of the entries of each vector, as in the metadata of an environment.
+    """
+    found = dict[str, Entry]()
+    for stream, entries in names.items():
+        readings = [entry.rpartition(".") for entry in entries]
+        for name, some in groupby(enumerate(readings), key=lambda each: each[1][0]):
+            places = list(some)
+            if name:
+                where = slice(places[0][0], places[-1][0] + 1)
+                found[name] = Entry(name, stream, where, tuple(last for _, (*_, last) in places))
+    return found
 
 
 def named(streams: Mapping[str, Stream], names: Iterable[str]) -> tuple[str, ...]:

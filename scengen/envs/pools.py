@@ -1,7 +1,10 @@
-"""The scenarios that an environment plays: those of some pools, of a split, or one of them."""
+"""The scenarios that an environment plays: those of some pools, of a split, or one of them.
+
+A small certified pool of every task comes with scengen; it is played if no pool is given.
+"""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,8 +14,9 @@ from ..pool.collection import members
 from ..pool.demonstrations import Demonstrations, is_demonstrations
 from ..pool.library import Library
 from ..pool.rows import AnyRow
+from ..samplers.task import Task
+from ..samplers.task_files import ID, shipped, version
 from ..samplers.task_files import tasks as known_tasks
-from ..samplers.task_files import version
 from ..validate.identity import check_versions
 
 Folders = str | Path | Sequence[str | Path]
@@ -23,15 +27,48 @@ AnyRows = TypeVar("AnyRows", Pool, Demonstrations)
 def rows_of(pool: Folders | Library[PoolRow] | None, task: str) -> Library[PoolRow]:
     """The scenarios of some pools; those of a library, which has been checked, as they are.
 
+    Args:
+        pool: None for the pool of the task that comes with scengen.
+
     Raises:
-        PoolError: no pool is given, or one is missing, damaged, empty, or of another version or task.
+        PoolError: there is no pool, or one is missing, damaged, empty, or of another version or task.
     """
     if isinstance(pool, Library):
         return pool
-    folders = [pool] if isinstance(pool, (str, Path)) else list(pool or ())
+    folders = [reference_pool(task)] if pool is None else [pool] if isinstance(pool, (str, Path)) else list(pool)
     if not folders:
         raise PoolError("no pool was given; give pool=FOLDER or a list of folders; scengen generate makes pools")
     return Library([_checked(Pool.open(each), task) for folder in folders for each in _pools_of_task(folder, task)])
+
+
+def reference_pool(task: str) -> Path:
+    """Folder of the certified training scenarios of a task that come with scengen.
+
+    Raises:
+        PoolError: the task is one of another package.
+    """
+    folder = shipped("generated") / "reference" / f"{task}-{ID}"
+    if not folder.is_dir():
+        remedy = f"give pool=FOLDER, which scengen generate task={task} pool=FOLDER makes"
+        raise PoolError(f"no pool was given, and none of {task} comes with scengen; {remedy}")
+    return folder
+
+
+def scenes_drawn_otherwise(rows: Library[Any], task: Task) -> Iterator[str]:
+    """Scenes of the pools that were not drawn from the distributions of a task: their bodies may be others."""
+    for pool in rows.pools:
+        if pool.manifest.config.split.partition("@")[0] not in (ID, *task.axes) or _drawn(pool) != _spaces(task.node):
+            yield from (scene for (scene,) in pool.columns("scene_xml"))
+
+
+def _drawn(pool: Any) -> list[Any]:
+    return _spaces(pool.manifest.config.task)
+
+
+def _spaces(node: Mapping[str, Any]) -> list[Any]:
+    """The distributions of a task's file: those of training and of all axes."""
+    axes = node.get("axes") or {}
+    return [node.get("id"), {name: axis.get("replace") for name, axis in axes.items()}]
 
 
 def located(pool: Folders | Library[PoolRow] | None) -> Folders | Library[PoolRow] | None:

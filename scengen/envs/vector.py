@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +18,7 @@ from ..errors import BadConfig, UnknownName, cut
 from ..pool import PoolRow
 from ..work.machine import cores
 from .gym import INFOS, RESET_OPTIONS, PoolEnv, clipped
-from .observations import Reading
+from .observations import Entry, Reading
 from .pools import Folders
 
 MODES = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP, AutoresetMode.DISABLED)
@@ -50,6 +51,8 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
     another one.
     """
 
+    _spec: EnvSpec | None = None
+
     def __init__(
         self,
         task: str,
@@ -63,7 +66,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
 
         Args:
             task: name of the task.
-            pool: folder of a pool, or several folders.
+            pool: folder of a pool, or several folders. Default: the scenarios of the task that come with scengen.
             num_envs: number of slots.
             threads: number of threads that step slots; None for the available cores.
             autoreset_mode: `NEXT_STEP`, `SAME_STEP` or `DISABLED`.
@@ -181,6 +184,24 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
     def render(self) -> tuple[Reading | None, ...] | None:  # type: ignore[override]
         """A picture of every slot as `PoolEnv.render`, or None without a render mode."""
         return None if self.render_mode is None else tuple(env.render() for env in self.envs)
+
+    @property
+    def spec(self) -> EnvSpec | None:  # type: ignore[override]
+        """Gymnasium's specification, with the time limit in steps."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:  # type: ignore[override]
+        self._spec = spec and self.envs[0].specified(spec)
+
+    def entry(self, name: str) -> Entry:
+        """Place of a reading in the observations, see `PoolEnv.entry`."""
+        return self.envs[0].entry(name)
+
+    @property
+    def legend(self) -> str:
+        """Every reading in the observations of a slot, see `PoolEnv.legend`."""
+        return self.envs[0].legend
 
     def close_extras(self, **_: Any) -> None:
         """Stop the threads and free the renderers."""

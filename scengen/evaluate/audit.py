@@ -149,7 +149,8 @@ class _Audit:
             return
         self.readable = True
         self._tell(broken(self.identity, self.lines, self.stored.episodes_sha256))
-        self._tell(incomplete(self.lines, self.wanted))
+        if not self._tell((None, text) for text in self.of_run.contradictions(self.told)):
+            self._tell(incomplete(self.lines, self.wanted, self.told.seeds))
         self._tell((None, text) for text in self._other_run())
         for number, line in enumerate(self.lines):
             self._tell((number, text) for text in untrue(line, self._every, self.identity, self.told.name))
@@ -215,8 +216,8 @@ class _Audit:
         return {(named[folder], id_): told for (folder, id_), told in some.items()}
 
     def _other_run(self) -> Iterator[str]:
-        """Settings of the table that are not those of the run, and scenarios that are left out without a reason."""
-        yield from self.of_run.contradictions(self.told)
+        """Choices of the table that do not follow from its settings, and scenarios that are left out without a
+        reason."""
         yield from self._other_choice()
         look = look_named(self.told.look)
         if (there := self.of_run.look_version) != look.version:

@@ -51,13 +51,23 @@ def broken(identity: Mapping[str, Any], lines: Lines, end: Any) -> Iterator[Faul
         yield None, "the last line is not the one that the table was made from"
 
 
-def incomplete(lines: Lines, wanted: set[RolloutId]) -> Iterator[Fault]:
-    """Rollouts that are missing or repeated."""
+def incomplete(lines: Lines, wanted: set[RolloutId], seeds: int | None = None) -> Iterator[Fault]:
+    """Rollouts that are missing or repeated.
+
+    Args:
+        seeds: number of scenarios of each pool, as the table says.
+    """
     counts = Counter(map(id_of, lines))
     for number, line in enumerate(lines):
         if counts[id_of(line)] > 1:
             yield number, f"is one of {counts[id_of(line)]} lines about the same rollout"
-    for which in sorted(wanted - set(counts)):
+    played, missing = {(which.pool, which.scenario) for which in counts}, wanted - set(counts)
+    if seeds is not None and (unplayed := {(which.pool, which.scenario) for which in missing} - played):
+        for pool, scenario in sorted(unplayed):
+            there = sum(folder == pool for folder, _ in played)
+            yield None, f"{scenario} of {pool} has no line: the table says seeds = {seeds}, the lines have {there}"
+        missing = {which for which in missing if (which.pool, which.scenario) in played}
+    for which in sorted(missing):
         changed = f" under {which.condition}" if which.condition else ""
         yield None, f"rollout {which.rollout} of {which.scenario}{changed} is missing"
 

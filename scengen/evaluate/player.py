@@ -220,7 +220,7 @@ def environments(
     """The environments in which the rollouts of a task are played, one for each slot.
 
     Args:
-        observed: names of streams and cameras; None for proprioception.
+        observed: names of streams and cameras; None for those of environments.
     """
     return PoolVectorEnv(
         task,

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..control.teleop import Filter, unfiltered
 from ..envs.gym import Observation, PoolEnv
+from ..envs.observations import ALL, requested
 from ..episode import Actions
 from ..errors import BadConfig, GaveUp, ScengenError, UnknownName, cut
 from ..learn.player import TrainedPolicy
@@ -85,7 +86,7 @@ class Needs:
 
     def missing(self, observed: Iterable[str]) -> list[str]:
         """Names that the policy reads and that are not among those that are observed."""
-        return [each for each in self.observations or () if each not in {*observed}]
+        return [each for each in self.observations or () if each not in requested(observed, ALL)]
 
 
 def _misdeclared(name: str, key: str, given: Any, what: str) -> BadConfig:

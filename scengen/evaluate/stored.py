@@ -7,6 +7,7 @@ from typing import Any
 
 from ..errors import BadConfig, ScengenError, cut
 from ..pool.untrusted import read_json
+from ..work.log import different
 from ..work.plain import MAX_JOURNAL, read_plain
 from ..work.typed import typed
 from .comparison import TABLE
@@ -74,8 +75,9 @@ class StoredRun:
             if there != here and not (name in own and there == own[name]):
                 yield f"{TABLE} says {name} = {there!r:.60}, {RUN} has {here!r:.60}"
         design = dict(table.design) if isinstance(table, ThresholdSettings) else {}
-        if design != self.threshold:
-            yield f"{TABLE} is of the search {design!r:.120}, {RUN} of {dict(self.threshold)!r:.120}"
+        for name in different(design, dict(self.threshold)):
+            there, here = design.get(name, "nothing"), self.threshold.get(name, "nothing")
+            yield f"{TABLE} is of a search with {name} = {there!r:.60}, {RUN} of one with {here!r:.60}"
 
 
 @dataclass(frozen=True)

@@ -33,13 +33,15 @@ from ..sim.embodiment import compose
 from ..sim.world import World
 from ..validate.playable import scene_errors
 from ..work.parallel import UNTRUSTED_LIMITS, apart
-from ..work.targets import appearing
+from ..work.targets import appearing, check_same
 from .mjcf import meshes_of
 
 SCENE = "scene.xml"
 """Name of the file of the scene."""
 WORLDS = "worlds.npz"
 """Name of the file of the worlds."""
+MESHES = "meshes"
+"""Name of the folder of the robot's meshes."""
 NOTE = "approximate: certificates hold for C MuJoCo under scengen's controller, not for other simulators"
 """Restriction that every export states."""
 PER_WORLD = tuple(
@@ -141,17 +143,40 @@ def of_layout(worlds: Iterable[BatchWorld], number: int | None) -> list[BatchWor
     raise BadConfig(f"{given}; give {', '.join(listed[:MAX_LISTED])}{more}")
 
 
-def write_batch(worlds: Sequence[BatchWorld], to: Path) -> None:
-    """Write worlds of one layout into a new folder, which appears when it is complete.
+def write_batch(worlds: Sequence[BatchWorld], to: Path) -> bool:
+    """Write worlds of one layout into a folder, which appears when it is complete.
+
+    Args:
+        to: a folder that is new or empty, or holds these worlds already.
+
+    Returns:
+        Whether it was written; it is not if it is there already.
 
     Raises:
-        BadConfig: the folder cannot be written.
+        BadConfig: the folder holds other things, or cannot be written.
         PoolError: the scene as MJCF is another one.
     """
     first = worlds[0]
-    scene, meshes, (layout, base) = apart(_scene, first.row, UNTRUSTED_LIMITS, f"exporting {first.row.name}")
+    files, (layout, base) = apart(_scene, first.row, UNTRUSTED_LIMITS, f"exporting {first.row.name}")
     if layout != first.layout:
         raise PoolError(f"the scene of {first.row.name} changes when MuJoCo writes it as MJCF; see scengen verify")
+    files = {**files, WORLDS: _packed(worlds, base)}
+    check_same(to, files)
+    if (to / WORLDS).exists():
+        return False
+    with appearing(to, folder=True) as path:
+        (path / MESHES).mkdir()
+        for name, content in files.items():
+            (path / name).write_bytes(content)
+    return True
+
+
+def _packed(worlds: Sequence[BatchWorld], base: Fields) -> bytes:
+    """Content of the file of the worlds.
+
+    Args:
+        base: fields of the scene in the file.
+    """
     arrays: dict[str, NDArray[Any]] = {
         "about": np.array(NOTE),
         "mujoco": np.array(mujoco.__version__),
@@ -161,29 +186,23 @@ def write_batch(worlds: Sequence[BatchWorld], to: Path) -> None:
         values = np.stack([one.fields[name] for one in worlds])
         if (values != value).any():
             arrays[f"{'model' if name in PER_WORLD else 'c'}.{name}"] = values
-    for name in first.state:
+    for name in worlds[0].state:
         arrays[f"state.{name}"] = np.stack([one.state[name] for one in worlds])
     packed = io.BytesIO()
     np.savez_compressed(packed, **arrays)  # type: ignore[arg-type]
-    with appearing(to, folder=True) as path:
-        (path / "meshes").mkdir()
-        for name, content in meshes.items():
-            (path / "meshes" / name).write_bytes(content)
-        (path / SCENE).write_text(scene)
-        (path / WORLDS).write_bytes(packed.getvalue())
+    return packed.getvalue()
 
 
-def _scene(row: PoolRow) -> tuple[str, dict[str, bytes], tuple[str, dict[str, NDArray[Any]]]]:
-    """The scene with robot as MJCF, the contents of its meshes, and what `_split_up` finds in it."""
+def _scene(row: PoolRow) -> tuple[dict[str, bytes], tuple[str, dict[str, NDArray[Any]]]]:
+    """Files of the scene with robot and of its meshes, and what `_split_up` finds in it."""
     with scene_errors(f" of {row.name}"):
         spec = compose(row.scene_xml, row.embodiment)
         spec.compile()
         root = to_plain_mjcf(spec)
-        meshes = dict(meshes_of(root, "meshes"))
+        meshes = {f"{MESHES}/{name}": content for name, content in meshes_of(root, MESHES)}
         root.insert(0, ET.Comment(f" {NOTE} "))
         text = ET.tostring(root, encoding="unicode") + "\n"
-        assets = {f"meshes/{name}": content for name, content in meshes.items()}
-        return text, meshes, _split_up(mujoco.MjModel.from_xml_string(text, assets))
+        return {**meshes, SCENE: text.encode()}, _split_up(mujoco.MjModel.from_xml_string(text, meshes))
 
 
 def opened(folder: Path | str, number: int) -> tuple[mujoco.MjModel, mujoco.MjData]:

@@ -24,7 +24,7 @@ from ..pool import Pool
 from ..pool.manifest import MANIFEST
 from ..samplers.split import ID
 from ..work.printed import printable
-from ..work.targets import appearing
+from ..work.targets import appearing, check_same, clear_unfinished, try_folder
 
 CARD_FILE = "README.md"
 """Name of the file that the Hub reads as the dataset card."""
@@ -62,8 +62,8 @@ class PublishedPool:
 
     @property
     def name(self) -> str:
-        """Name of the configuration and of its folder: `domino_single-wide_gaps@3`."""
-        return f"{self.pool.task}-{self.pool.split}"
+        """Name of the configuration and of its folder."""
+        return configuration(self.pool)
 
     @property
     def split(self) -> str:
@@ -74,13 +74,6 @@ class PublishedPool:
     def scenario_files(self) -> list[str]:
         """Names of its files of scenarios."""
         return [entry.file for entry in self.pool.manifest.shards]
-
-    @property
-    def other_files(self) -> list[str]:
-        """Names of its other files: the manifest, rejected draws that were kept, hits of an attack."""
-        manifest = self.pool.manifest
-        rejected = [manifest.rejected.file] if manifest.rejected else []
-        return [MANIFEST, *rejected, *(hit["file"] for hit in manifest.hits)]
 
 
 @dataclass(frozen=True)
@@ -215,11 +208,37 @@ class Tally:
         return Markdown(f"{self.worst['solved']} of {self.worst['runs']} (> {self.worst['bound']:.0%})")
 
 
+def check_target(to: Path, pools: Sequence[Pool]) -> None:
+    """Raise `BadConfig` unless a folder can be written, and is new, empty, or a data set of some pools already."""
+    if not to.name:
+        raise BadConfig(f"to = {to}; name a new folder for the data set")
+    clear_unfinished(to)
+    try_folder(to)
+    check_same(to, {**_copies(pools), CARD_FILE: to / CARD_FILE} if (to / CARD_FILE).is_file() else {})
+
+
+def _copies(pools: Sequence[Pool]) -> dict[str, Path]:
+    """The files of some pools by their paths in the data set: scenarios, the manifest, rejected draws that were kept,
+    hits of an attack."""
+    found = {}
+    for pool in pools:
+        manifest = pool.manifest
+        rejected = [manifest.rejected.file] if manifest.rejected else []
+        shards, hits = [entry.file for entry in manifest.shards], [hit["file"] for hit in manifest.hits]
+        found |= {f"{configuration(pool)}/{file}": pool.folder / file for file in (*shards, MANIFEST, *rejected, *hits)}
+    return found
+
+
+def configuration(pool: Pool) -> str:
+    """Name of the configuration of a pool and of its folder: `domino_single-wide_gaps@3`."""
+    return f"{pool.task}-{pool.split}"
+
+
 def check_pools(pools: Sequence[Pool]) -> None:
     """Raise `BadConfig` unless every pool is the only one of its task and split, and has scenarios."""
     found: dict[str, Path] = {}
     for pool in pools:
-        name = f"{pool.task}-{pool.split}"
+        name = configuration(pool)
         if name in found:
             raise BadConfig(f"{found[name]} and {pool.folder} are both {name}; give one pool of each task and split")
         if not len(pool):
@@ -227,21 +246,27 @@ def check_pools(pools: Sequence[Pool]) -> None:
         found[name] = pool.folder
 
 
-def publish(card: DatasetCard, to: Path) -> None:
+def publish(card: DatasetCard, to: Path) -> bool:
     """Write the data set: the card and copies of its pools. The folder appears when it is complete.
 
+    Returns whether it was written; it is not if it is there already.
+
     Args:
-        to: a folder that is new or empty.
+        to: a folder that is new or empty, or holds this data set, as after a command that was killed at its end.
 
     Raises:
-        BadConfig: the folder cannot be written.
+        BadConfig: the folder holds another data set, or cannot be written.
     """
+    copies, text = _copies([published.pool for published in card.pools]), card.readme()
+    check_same(to, {**copies, CARD_FILE: text.encode()})
+    if (to / CARD_FILE).exists():
+        return False
     with appearing(to, folder=True) as path:
-        for published in card.pools:
-            for name in (*published.scenario_files, *published.other_files):
-                (path / published.name / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(published.pool.folder / name, path / published.name / name)
-        (path / CARD_FILE).write_text(card.readme())
+        for name, source in copies.items():
+            (path / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, path / name)
+        (path / CARD_FILE).write_text(text)
+    return True
 
 
 def own_license() -> str:

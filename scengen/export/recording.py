@@ -9,10 +9,11 @@ environment without a filter. robomimic's data have a row for every control peri
 """
 
 import itertools
+import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 from types import TracebackType
@@ -34,16 +35,18 @@ from ..perturb.perturbation import Perturbation
 from ..pictures.film import periods_between
 from ..pictures.render import Camera, Picture
 from ..pictures.video import check_size
-from ..pool import collection
+from ..pool import collection, kinds
 from ..pool.demonstrations import demonstration_folders, is_demonstrations
 from ..pool.row import DemonstrationRow
 from ..sim.world import World
 from ..validate.playable import stored_world, unplayable
 from ..work.limits import at_least
+from ..work.log import different
 from ..work.parallel import Workers
-from ..work.targets import appearing, check_unfinished, try_file, try_folder
+from ..work.targets import appearing, clear_unfinished, try_file, try_folder
+from ..work.typed import typed
 from .cameras import calibration
-from .dataset import TASK_VERSION
+from .dataset import TASK_VERSION, Recording
 from .hdf5 import check_target
 from .lerobot import DatasetWriter, Feature
 from .native import FULL_RATE, NativeWriter
@@ -159,9 +162,8 @@ class RecordSettings:
                 )
         else:
             check_size(self.width, self.height)
-        if Path(self.to).exists():
-            raise BadConfig(f"{self.to} exists already; delete it, or give another name")
-        check_unfinished(self.to)
+        kinds.check_target(self.to, kinds.RECORDING)
+        clear_unfinished(self.to)
         (try_file if self.format == ROBOMIMIC else try_folder)(self.to)
 
 
@@ -173,10 +175,12 @@ class RecordSummary:
     """Number of episodes."""
     rows: int
     """Number of rows."""
-    failed: tuple[str, ...]
+    failed: Sequence[str]
     """Names of the scenarios whose actions did not reach the goal; their episodes are marked as failures."""
     lost: Mapping[str, str]
     """Reasons by name of the scenarios that were left out, because they cannot be replayed within the limits."""
+    earlier: bool = False
+    """Whether an earlier run of the same command has written it."""
 
 
 def record(settings: RecordSettings, progress: Callable[[int, int], None], search: Sequence[str] = ()) -> RecordSummary:
@@ -207,6 +211,9 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
     settings.perturbation.check([*recorded.streams], views, settings.shown or ROOM)
     for name, task in tasks.items():
         settings.perturbation.check_words(Words.of(name, task.instruction, search))
+    source = _source(settings, [pool.sha256 for pool in pools], {name: task.version for name, task in tasks.items()})
+    if Path(settings.to).exists():
+        return _again(settings, source)
     failed, left_out, styles = list[str](), dict[str, str](), Counter[str]()
     with appearing(settings.to, folder=settings.format == LEROBOT) as path:
         scenarios = count // settings.looks
@@ -238,12 +245,40 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
                 if isinstance(row, DemonstrationRow):
                     styles[row.style] += 1
                 progress(writer.episodes, count)
-            source = {"pools": [pool.sha256 for pool in pools], "versions": versions()}
-            source["task_versions"] = {name: task.version for name, task in tasks.items()}
-            if settings.shown:
-                source["look"] = str(settings.shown)
+            summary = RecordSummary(writer.episodes, writer.rows, failed, left_out)
+            source["summary"] = asdict(summary)
             writer.finish({**source, "styles": dict(styles)} if styles else source)
-    return RecordSummary(writer.episodes, writer.rows, tuple(failed), left_out)
+    return summary
+
+
+def _source(settings: RecordSettings, pools: Sequence[str], task_versions: Mapping[str, int]) -> dict[str, Any]:
+    """Everything on which a recording depends, as it tells it.
+
+    Args:
+        pools: hashes of the pools.
+        task_versions: versions of the tasks by name.
+    """
+    chosen = {name: value for name, value in asdict(settings).items() if name not in ("pool", "to", "workers")}
+    look = {"look": str(settings.shown)} if settings.shown else {}
+    return {"pools": pools, "versions": versions(), "task_versions": task_versions, **look, "settings": chosen}
+
+
+def _again(settings: RecordSettings, source: Mapping[str, Any]) -> RecordSummary:
+    """The summary of a recording that is there already, for a command that is repeated.
+
+    Raises:
+        BadConfig: something else is there.
+    """
+    if settings.format == ROBOMIMIC:
+        from .robomimic import stored_source
+
+        stored = stored_source(Path(settings.to))
+    else:
+        stored = Recording(Path(settings.to)).source if Path(settings.to, kinds.RECORDING).is_file() else {}
+    if names := different({name: stored.get(name) for name in source}, json.loads(json.dumps(source))):
+        why = "has other " + ", ".join(names) if stored else "is no recording"
+        raise BadConfig(f"{settings.to} exists already and {why}; delete it, or give another name")
+    return typed("summary", RecordSummary, {**stored["summary"], "earlier": True}, exact=True)
 
 
 class Writer(Protocol):

@@ -160,6 +160,18 @@ class Demonstrations:
             self._output.check()
 
 
+def stored_source(path: Path) -> dict[str, Any]:
+    """What a file says of its origin, see `Demonstrations.finish`; nothing if it is no file of scengen."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            found = json.loads(file["data"].attrs["scengen"])
+    except (OSError, KeyError, ValueError, TypeError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
 def environment(
     task: str, pools: Sequence[str], cameras: Sequence[str], size: tuple[int, int], search: tuple[str, ...]
 ) -> tuple[RobosuiteEnv, dict[str, Any]]:

@@ -9,11 +9,13 @@ POLICY = "policy.json"
 """File that marks a trained policy."""
 EPISODES = "episodes.jsonl"
 """File that marks an evaluation."""
+RECORDING = "meta/info.json"
+"""File that marks a recording."""
 MARKS = {
     "manifest.json": "a pool",
     "demonstrations.json": "demonstrations",
     "index.json": "an index of pools",
-    "meta/info.json": "a recording",
+    RECORDING: "a recording",
     POLICY: "a trained policy",
     EPISODES: "an evaluation",
 }

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any, Generic, overload
 
 import numpy as np
@@ -53,6 +54,10 @@ class Library(Sequence[AnyRow], Generic[AnyRow]):
         """A few columns of all scenarios, see `StoredRows.columns`."""
         for pool, places in self._by_pool():
             yield from pool.columns(*names, places=places)
+
+    def folder_of(self, id_: str) -> Path:
+        """Folder of the pool that holds the scenario of an id."""
+        return self.pools[self.source(self.find(id_))].folder
 
     def source(self, number: int) -> int:
         """Number of the pool that holds a scenario."""

@@ -20,7 +20,7 @@ from ..validate import lock
 from ..validate.certify import Certified, certify
 from ..validate.labels import labels_of_draw, labels_of_task, made_with
 from ..validate.settings import CertifySettings
-from ..work.limits import at_least
+from ..work.limits import at_least, check_count
 from ..work.parallel import Limits, Workers
 from .attempts import Progress, Wanted, extend, first_of, infeasible, rejection, reported_write_errors
 from .filling import Filling, moved_shards
@@ -47,9 +47,10 @@ class GenerateSettings:
 
     def check(self, task: Task) -> None:
         """Raise `ScengenError` for a setting that makes no sense for this task."""
-        task.shifts(self.split)
-        task.design(self.sampler)
         at_least(self, n=1, seed=0, workers=1, limit=1, limit_seconds=1, limit_mb=200, attack=0)
+        if self.attack:
+            attacks.check_budget("attack", self.attack, self.n)
+        check_count(self.n, self.limit, *task.different(self.split, self.sampler), "scenarios")
         for verdict in self.keep:
             if verdict not in ("refuted", "unknown"):
                 raise BadConfig(f"keep = {verdict}; it must be refuted, unknown, or both")
@@ -206,8 +207,8 @@ def _extend(
 ) -> None:
     """Add records in the order of indices until n are certified or the limit is reached."""
     limit = settings.limit or max(100, 20 * settings.n)
-    if size := job.task.design(job.sampler).size:
-        limit = min(limit, size)
+    different, _ = job.task.different(job.split, job.sampler)
+    limit = min(limit, different or limit)
     # an attack decides last which scenarios are in a pool
     filling = Filling(journal, 0 if settings.attack else settings.n)
     limits = Limits(settings.limit_seconds, settings.limit_mb)

@@ -17,6 +17,7 @@ from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Conditions, Refutation, Scenario
 from ..sim.embodiment import EMBODIMENTS
+from ..work.foreign import place_of
 from . import conditions, designs
 from .axis import Axis, Proof
 from .designs import Design, Independent
@@ -237,6 +238,18 @@ class Task:
         """
         return designs.parse(spelled, self.name, self.training)
 
+    def different(self, split: Split | str, sampler: str) -> tuple[int | None, str]:
+        """Number of different scenarios of a split, and what limits it; None without a limit.
+
+        Raises:
+            ScengenError: there is no such split or no such design.
+        """
+        replaced, design = self.shifts(split), self.design(sampler)
+        if design.size is not None:
+            return design.size, f"sampler={sampler} has {design.size} different ones"
+        constant = all(isinstance(dist, Fixed) for dist in {**self.training, **replaced}.values())
+        return (1, f"all scenarios of split {split} are equal, because no parameter varies") if constant else (None, "")
+
     def draw(self, split: Split | str, seed: int, index: int, design: Design | None = None) -> Draw:
         """Draw scenario `index` of a split. It depends on (task, parameter, seed, index, attempt) and nothing else.
 
@@ -394,6 +407,8 @@ def _family(name: str, path: Any) -> type[Scenario]:
         why = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
         if isinstance(error, ModuleNotFoundError) and error.name == module.partition(".")[0]:
             why += "; install the package, as with pip install --editable FOLDER"
+        elif place := place_of(error):
+            why += f", {place}"
         raise BadConfig(f"{name}.family = {cut(repr(path))} cannot be imported ({why})") from None
     if not (isinstance(family, type) and issubclass(family, Scenario)):
         raise BadConfig(f"{name}.family = {cut(repr(path))} is not a Scenario")

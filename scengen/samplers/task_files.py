@@ -4,6 +4,7 @@ This is the fast path for commands that must answer quickly. Task files are in c
 offer tasks, and in folders that a command line names.
 """
 
+import filecmp
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ PACKAGES = "scengen.tasks"
 it that holds `task/<task>.yaml` or kinds of perturbation."""
 OFFERED = ("task", "perturbations")
 """Folders of which a package offers one at least."""
+OF_TASKS = ("facts", "language", "things")
+"""Folders next to `task` whose files belong to the tasks of these names."""
 ID = "id"
 """Name of the training split."""
 EMBODIMENT = "panda_jaw"
@@ -248,6 +251,26 @@ def is_folder(folder: str) -> bool:
     """Whether a folder that Hydra spells with a scheme exists."""
     path = _plain(folder)
     return bool(path) and Path(path).is_dir()
+
+
+def unread(folder: str) -> str:
+    """A file in a folder of a search path that no command would read, and why; empty if there is none."""
+    here, home = Path(_plain(folder)), conf_dir()
+    for path in sorted(here.glob("*/*.yaml")):
+        group, name = path.parent.name, path.stem
+        shadow, of_task = home / group / path.name, group in ("task", *OF_TASKS)
+        if shadow.is_file() and path.is_file() and filecmp.cmp(shadow, path, shallow=False):
+            continue
+        if of_task and (home / "task" / path.name).is_file():
+            own = f"name it after a task of your own, which `defaults: [{name}, _self_]` continues"
+            return f"{path} would not be read, scengen's task {name} has its own files; {own}"
+        if shadow.is_file():
+            return f"{path} would not be read, scengen has a file of that name; give it another name"
+        if group in OF_TASKS and not (here / "task" / path.name).is_file():
+            return f"{path} would not be read, there is no task/{path.name} beside it; name it after a task there"
+        if group == "perturbations":
+            return f"{path} would not be read; offer the folder by an installed package, see docs/perturb.md"
+    return ""
 
 
 MAX_TASK_FILE = 1_000_000

@@ -7,7 +7,6 @@ from itertools import repeat
 from typing import Any
 
 import numpy as np
-from scipy.special import betaincinv
 
 from .. import html_tables
 from ..certificate import CHECKS, NOT_CHECKED, Certificate, Check
@@ -22,9 +21,7 @@ from ..sim.world import World
 from .impaired import held, impaired, posed
 from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
 from .settings import QUICK, CertifySettings
-
-CONFIDENCE = 0.95
-"""Confidence of the one-sided bound on the oracle's success rate."""
+from .settings import lower_bound as lower_bound  # for those that judge rates
 
 
 @dataclass(frozen=True)
@@ -343,11 +340,6 @@ NOT_TRIED = "not tried"
 def no_ablations(scenario: Scenario) -> str:
     """Reason in a certificate of a family that has no ablations."""
     return NOT_CHECKED + (scenario.NO_ABLATIONS or "the family has no ablations, and does not say why")
-
-
-def lower_bound(successes: int, runs: int) -> float:
-    """One-sided Clopper-Pearson lower bound of a success rate at 95 % confidence."""
-    return float(betaincinv(successes, runs - successes + 1, 1 - CONFIDENCE)) if successes else 0.0
 
 
 def _outcome(episode: Rollout) -> dict[str, Any]:

@@ -1,10 +1,25 @@
 """Settings of a certificate: the numbers of conf/certify/*.yaml, with their types."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from scipy.special import betaincinv
+
 from ..errors import BadConfig, cut
+
+CONFIDENCE = 0.95
+"""Confidence of the bound of the robustness check, one-sided."""
+FEWEST = 2
+"""Smallest number of rollouts of an attack on a scenario: one plan, filtered and raw."""
+MAX_RUNS = 1000
+"""Largest number of jittered runs."""
+
+
+def lower_bound(successes: int, runs: int) -> float:
+    """One-sided Clopper-Pearson lower bound of a success rate at 95 % confidence."""
+    return float(betaincinv(successes, runs - successes + 1, 1 - CONFIDENCE)) if successes else 0.0
 
 
 @dataclass(frozen=True)
@@ -47,16 +62,29 @@ class CertifySettings:
             low, high, unit = BOUNDS[name]
             if not low <= value <= high:
                 raise BadConfig(f"certify.{name} = {cut(str(value))}; it must lie in [{low:g}, {high:g}]{unit}")
+        if 0 < self.attack < FEWEST:
+            raise BadConfig(
+                f"certify.attack = {self.attack}; a plan is played filtered and raw; give 0, or {FEWEST} or more"
+            )
+        runs, bound = self.robust.runs, self.robust.bound
+        if lower_bound(runs, runs) < bound:
+            fewest = next((n for n in range(runs, MAX_RUNS + 1) if lower_bound(n, n) >= bound), None)
+            shown = math.floor(100 * lower_bound(runs, runs)) / 100
+            more = f"certify.robust.runs={fewest}, or " if fewest else ""
+            raise BadConfig(
+                f"certify.robust.runs = {runs} with certify.robust.bound = {bound:g} cannot be met: {runs} successes "
+                f"in {runs} runs show {lower_bound(runs, runs):.3g}; give {more}certify.robust.bound={shown:g}"
+            )
 
 
 BOUNDS: dict[str, tuple[float, float, str]] = {
     "overlap": (0.0, 0.01, " m"),
     "rest.seconds": (0.1, 60.0, " s"),
-    "rest.drift": (0.0, 0.1, " m"),
+    "rest.drift": (1e-5, 0.1, " m"),  # contacts of MuJoCo give way by some micrometres
     "rest.turn": (0.0, 90.0, " deg"),
     "settle": (0.01, 10.0, " s"),  # one control period at least
-    "robust.runs": (1, 1000, ""),
-    "robust.bound": (0.0, 1.0, ""),
+    "robust.runs": (1, MAX_RUNS, ""),
+    "robust.bound": (0.0, 1.0, ""),  # what the number of runs can show
     "robust.position": (0.0, 0.1, " m"),
     "robust.turn": (0.0, 180.0, " deg"),
     "robust.mass": (0.0, 0.9, ""),  # relative: a body keeps a tenth of its mass

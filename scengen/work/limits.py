@@ -43,6 +43,23 @@ MAX_SETTINGS = {
 computed."""
 
 
+def check_count(n: int, limit: int | None, most: int | None, why: str, what: str) -> None:
+    """Raise `BadConfig` if a run cannot make n results, whatever it draws.
+
+    Args:
+        limit: largest number of tries; None if it is not set.
+        most: number of different tries that there are; None without a limit.
+        why: the reason why there are no more.
+        what: the results, such as "scenarios".
+    """
+    if limit is not None and limit < n:
+        raise BadConfig(
+            f"limit = {limit}; {n} {what} need at least as many tries; give limit={n} or more, or a smaller n"
+        )
+    if most is not None and most < n:
+        raise BadConfig(f"n = {n} {what}; {why}; give n={most} or less, or other settings")
+
+
 def at_least(settings: object, **lowest: float) -> None:
     """Raise `BadConfig` for the first of the named settings that is below its lowest value or above `MAX_SETTINGS`.
 

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -72,10 +72,15 @@ class Log:
             raise refused(self.path, error) from None
         self.records.append(record)
 
+    def sort(self, key: Callable[[dict[str, Any]], Any]) -> None:
+        """Bring the records into an order that does not depend on when they were added."""
+        if (there := sorted(self.records, key=key)) != self.records:
+            self.replace(there)
+
     def replace(self, records: list[dict[str, Any]]) -> None:
-        """Replace all records of a log with a separate head, at once or not at all."""
-        assert self.head is not None
-        write(self.path, b"".join(json.dumps(record).encode() + b"\n" for record in records))
+        """Replace all records, at once or not at all."""
+        lines = records if self.head else [self.identity, *records]
+        write(self.path, b"".join(json.dumps(line).encode() + b"\n" for line in lines))
         self._file.close()
         self._file = open(self.path, "ab", buffering=0)  # noqa: SIM115  (closed by `close`)
         self.records = records

@@ -16,6 +16,7 @@ from typing import Any, NoReturn, Protocol, TypeVar, runtime_checkable
 from ..control import native
 from ..errors import ScengenError
 from . import machine
+from .foreign import with_place
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -342,12 +343,13 @@ def _reply(function: Callable[[Any], Any], item: Any, limits: Limits | None) -> 
 
 def portable(error: Exception) -> bytes:
     """A pickled exception; one that cannot be pickled becomes one with the same message that can."""
+    placed = with_place(error)
     try:
-        pickle.loads(written := pickle.dumps(("error", error)))
+        pickle.loads(written := pickle.dumps(("error", placed)))
         return written
     except Exception:
         kind = ScengenError if isinstance(error, ScengenError) else RuntimeError
-        return pickle.dumps(("error", kind(str(error))))
+        return pickle.dumps(("error", with_place(kind(str(error)).with_traceback(error.__traceback__))))
 
 
 _READY = b"ready"

@@ -1,21 +1,25 @@
 """Output files and folders: tested before the work, written whole or not at all. Faults come with a remedy."""
 
 import errno
+import filecmp
 import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
 from ..errors import BadConfig, cut
+from .plain import why_not_plain
 
 STREAMS = ("/dev/stdout", "/dev/stderr", "/dev/null")
 """Devices that are accepted as a target."""
 
+PART = ".part"
+"""Suffix of the name of a file while it is written."""
 _REMEDY = {
     errno.ENOSPC: "make room and repeat the command",
     errno.EDQUOT: "make room and repeat the command",
@@ -95,7 +99,7 @@ def write(path: Path, content: str | bytes) -> None:
         BadConfig: it cannot be written.
     """
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
-    part = path.with_name(f"{path.name}.part") if len(path.name) < 250 else path.with_name(f"{path.name[:-9]}.part")
+    part = path.with_name(f"{path.name if len(path.name) < 250 else path.name[:-9]}{PART}")
     try:
         if str(path) in STREAMS:
             with open(path, "wb") as stream:
@@ -113,32 +117,27 @@ def write(path: Path, content: str | bytes) -> None:
         raise refused(path, error) from None
 
 
-def check_new_folder(to: str) -> None:
-    """Raise `BadConfig` unless a folder is new or empty, and can be written."""
-    path = Path(to)
-    if path.is_dir() and any(path.iterdir()):
-        raise BadConfig(f"{to} is not empty; delete it, or name another folder")
-    if not path.name:
-        raise BadConfig(f"to = {to}; name a new folder")
-    check_unfinished(path)
-    try_folder(to)
-
-
 def unfinished(to: Path | str) -> Path:
     """Path of a file or folder while it is written."""
     return Path(f"{to}.unfinished")
 
 
-def check_unfinished(to: Path | str) -> None:
-    """Raise `BadConfig` if a target is being written by another command, or something else has its unfinished name."""
+def clear_unfinished(to: Path | str) -> None:
+    """Discard what a killed command has left of a target.
+
+    Raises:
+        BadConfig: another command is writing it, or something else has its unfinished name.
+    """
     part = unfinished(to)
-    if not os.path.lexists(part):
-        return
     try:
         if not _lock_file(part).is_file():
-            raise BadConfig(f"{cut(str(part))} is in the way, and no command of scengen wrote it; move it elsewhere")
-        with FileLock(_lock_file(part), timeout=0):
-            pass
+            if os.path.lexists(part):
+                raise BadConfig(
+                    f"{cut(str(part))} is in the way, and no command of scengen wrote it; move it elsewhere"
+                )
+            return
+        with _lock_of(part):
+            _discard(part)
     except Timeout:
         raise BadConfig(
             f"{cut(str(part))} is being written by another command; wait for it, or name another target"
@@ -165,9 +164,8 @@ def appearing(to: Path | str, folder: bool) -> Iterator[Path]:
     part = unfinished(to)
     try:
         part.parent.mkdir(parents=True, exist_ok=True)
-        check_unfinished(to)
+        clear_unfinished(to)
         with _lock_of(part):
-            _discard(part)  # left by a command that was killed
             part.mkdir() if folder else part.touch(exist_ok=False)
             try:
                 yield part
@@ -176,9 +174,37 @@ def appearing(to: Path | str, folder: bool) -> Iterator[Path]:
                 _discard(part)
                 raise
     except Timeout:
-        check_unfinished(to)
+        clear_unfinished(to)
     except OSError as error:
         raise refused(to, error) from None
+
+
+def foreign(folder: Path, files: Mapping[str, bytes | Path]) -> str:
+    """Path in a folder of something that is not among some files, or differs; empty if a command that writes them may
+    have left all that is there.
+
+    Args:
+        files: contents of the files, or files with these contents, by their paths in the folder.
+    """
+    for path in sorted(folder.rglob("*")) if folder.is_dir() else ():
+        name = path.relative_to(folder).as_posix()
+        if path.is_dir() and not path.is_symlink() and any(other.startswith(f"{name}/") for other in files):
+            continue
+        if name.removesuffix(PART) != name and name.removesuffix(PART) in files:  # `write` was killed
+            continue
+        if name not in files or why_not_plain(path) or not _same(path, files[name]):
+            return name
+    return ""
+
+
+def check_same(folder: Path, files: Mapping[str, bytes | Path]) -> None:
+    """Raise `BadConfig` if a folder holds anything `foreign`."""
+    if other := foreign(folder, files):
+        raise BadConfig(f"{folder} is not empty: it holds {cut(other)}; delete it, or name another folder")
+
+
+def _same(path: Path, made: bytes | Path) -> bool:
+    return filecmp.cmp(path, made, shallow=False) if isinstance(made, Path) else path.read_bytes() == made
 
 
 @contextmanager

@@ -13,9 +13,9 @@ import pytest
 from pools import make
 
 from scengen import cli, load_task
-from scengen.attack.campaign import drawn
+from scengen.attack.campaign import AttackSettings, attack, drawn
 from scengen.attack.check import attacked
-from scengen.attack.evidence import Hit, replayed
+from scengen.attack.evidence import OTHER_SCENARIO, Hit, Replayed, replayed
 from scengen.errors import BadConfig
 from scengen.pool import Pool
 from scengen.pool.files import sha256
@@ -198,6 +198,26 @@ def test_what_a_hit_says_is_checked_before_it_is_used(attacked_pool, tmp_path, c
     argv = command.format(hit=tmp_path / "hit.npz", to=tmp_path / "strip.png").split()
     assert cli.run(argv) == 2
     assert "is not a hit of scengen attack, or is damaged: " in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_hits_under_conditions_of_control_replay_under_them_alone(tmp_path):
+    subjects = drawn(TASK, "payload@1", 1, 0)
+    settings = AttackSettings(split="payload@1", budget=4, tiers=["witness"])
+    report = attack(TASK, subjects, settings, tmp_path, lambda *_: None)
+    assert report.hits
+    for hit in report.hits:
+        assert hit.conditions == "payload@1" and replayed(hit, TASK) == Replayed()
+        assert replayed(replace(hit, conditions=""), TASK).fault == OTHER_SCENARIO
+        assert replayed(replace(hit, conditions="payload@1+wide_gaps"), TASK).fault == OTHER_SCENARIO
+
+
+def test_a_filtered_hit_says_whether_the_filter_can_give_its_actions_from_rest():
+    still, sudden = np.zeros((3, 14), np.float32), np.zeros((3, 14), np.float32)
+    sudden[1, 7] = 0.2  # the second arm
+    about = ("0123456789ab", "witness"), ("a plan", 1.0, "0" * 16, (), (), {})
+    found = [Hit(*about[0], raw, *about[1], actions) for raw in (False, True) for actions in (still, sudden)]
+    assert [hit.resumed for hit in found] == [False, True, False, False]
+    assert str(found[1]).startswith("by witness, filtered from a state of the witness on: a plan")
 
 
 def test_a_hit_of_another_version_is_told_of(attacked_pool, tmp_path, capsys, monkeypatch):

@@ -20,7 +20,7 @@ import pyarrow.parquet as pq
 from forgery import Case, Draft
 from make_base import BASE
 
-REFERENCE = Path(__file__).parents[2] / "generated" / "reference"
+REFERENCE = Path(__file__).parents[2] / "generated" / "reference" / "domino_single-id"
 HASH = "ab" * 32
 Manifest = dict[str, Any]
 Forge = Callable[[Manifest, list[Any], list[Any]], None]

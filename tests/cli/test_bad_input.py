@@ -34,7 +34,7 @@ def test_a_pool_without_scenarios_is_refused_by_what_needs_some(empty, argv, cap
     assert told.count("\n") == 1 and "no scenario" in told and str(empty) in told and not list(tmp_path.iterdir())
 
 
-REFERENCE = "pool=generated/reference"
+REFERENCE = "pool=generated/reference/domino_single-id"
 
 
 @pytest.mark.parametrize(

@@ -392,7 +392,7 @@ def test_a_shortcut_that_never_rests_gets_a_remedy(monkeypatch, capsys, tmp_path
     import scengen.cli.commands.generate as command
 
     def rejected(task, certify_settings, settings, progress):
-        pool = Pool.open("generated/reference")
+        pool = Pool.open("generated/reference/domino_single-id")
         reasons = {"shortcuts: 'spin' was not seen to its end (raw): the goal was not reached in # s": 3}
         return generate.Summary(pool, 1, 4, pool.manifest.funnel, reasons, 1, None, 1.0)
 

@@ -80,8 +80,19 @@ def test_bad_input_is_one_line_and_writes_nothing(capsys, tmp_path, monkeypatch,
     assert says in told and told.count("\n") == 1 and not list(tmp_path.iterdir())
 
 
+def test_a_package_that_a_kill_has_cut_short_is_completed(capsys, tmp_path):
+    command = ("new", "task=slide_home", "package=lab_tasks", f"to={tmp_path / 'new'}")
+    assert cli.run(command) == 0
+    whole = {path: path.read_bytes() for path in (tmp_path / "new").rglob("*") if path.is_file()}
+    first, second, *_ = sorted(whole)
+    first.unlink()
+    second.rename(f"{second}.part")
+    assert cli.run(command) == 0
+    assert {path: path.read_bytes() for path in (tmp_path / "new").rglob("*") if path.is_file()} == whole
+
+
 def test_a_folder_that_is_not_empty_stays_as_it_is(capsys, tmp_path):
     (tmp_path / "README.md").write_text("mine")
     assert cli.run(("new", "task=slide_home", "package=lab_tasks", f"to={tmp_path}")) == 2
-    assert "is not empty; give a new folder as to=FOLDER" in capsys.readouterr().err
+    assert "is not empty: it holds README.md; give a new folder as to=FOLDER" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["README.md"] and (tmp_path / "README.md").read_text() == "mine"

@@ -58,3 +58,31 @@ def test_a_base_that_is_none_is_one_line(search, tmp_path, capsys, defaults, tol
     assert cli.run(["tasks", search]) == 2
     line = capsys.readouterr().err
     assert told in line and line.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("file", "told"),
+    [
+        ("task/domino_single.yaml", "scengen's task domino_single has its own files; name it after a task of your own"),
+        ("language/domino_single.yaml", "which `defaults: [domino_single, _self_]` continues"),
+        ("language/domino_mien.yaml", "there is no task/domino_mien.yaml beside it; name it after a task there"),
+        ("things/packing.yaml", "scengen's task packing has its own files"),
+        ("certify/quick.yaml", "scengen has a file of that name; give it another name"),
+        ("perturbations/dust.yaml", "offer the folder by an installed package"),
+    ],
+)
+def test_a_file_that_nothing_would_read_is_refused(search, tmp_path, capsys, file, told):
+    (path := tmp_path / "conf" / file).parent.mkdir(exist_ok=True)
+    path.write_text("a: 1\n")
+    assert cli.run(["tasks", search]) == 2
+    line = capsys.readouterr().err
+    assert f"{file} would not be read, " in line.replace("read;", "read, ") and told in line and line.count("\n") == 1
+
+
+def test_a_copy_of_a_file_and_the_words_of_a_task_of_its_own_are_accepted(search, tmp_path):
+    for group, name in (("task", "packing"), ("language", "domino_single")):
+        (path := tmp_path / "conf" / group / f"{name}.yaml").parent.mkdir(exist_ok=True)
+        path.write_bytes((task_files.conf_dir() / group / f"{name}.yaml").read_bytes())
+    (tmp_path / "conf" / "language" / "domino_single.yaml").rename(tmp_path / "conf" / "language" / "domino_mine.yaml")
+    assert cli.run(["tasks", search]) == 0
+    assert task_files.file_of_group("domino_mine", "language", [search]) is not None

@@ -10,14 +10,16 @@ import mujoco
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from helpers import REFERENCE, pictures_are_possible
+from helpers import REFERENCE, REFERENCES, pictures_are_possible
 
 from scengen import list_tasks, load_task
 from scengen.control.teleop import LARGEST_CHANGE
 from scengen.envs import gym, observations
 from scengen.envs.gym import PoolEnv, register
+from scengen.envs.pools import reference_pool
 from scengen.errors import BadConfig, PoolError, UnknownName
 from scengen.pool import Pool
+from scengen.pool.collection import members
 from scengen.samplers import task_files
 from scengen.sim.arm import IDLE
 
@@ -39,6 +41,67 @@ def test_gymnasiums_own_checker_has_nothing_to_say():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(PoolEnv("domino_single", REFERENCE, observations=EVERYTHING), skip_render_check=True)
+
+
+def test_without_a_pool_the_scenarios_that_come_with_scengen_are_played():
+    made = gymnasium.make("scengen/domino_single-v2")
+    told = made.reset(seed=1, options={"labels": True})[1]
+    assert made.unwrapped.scenarios == tuple(row.id for row in Pool.open(REFERENCES / "domino_single-id").rows())
+    assert told["pool"] == str(REFERENCES / "domino_single-id") and told["instruction"] == made.unwrapped.instruction
+
+
+def test_a_certified_pool_of_every_task_comes_with_scengen():
+    """`make test` verifies them."""
+    pools = [Pool.open(folder) for folder in members(REFERENCES)]
+    assert sorted(pool.task for pool in pools) == sorted(list_tasks())
+    assert all(pool.split == "id" and 3 <= len(pool) <= 6 for pool in pools)
+    assert sum(file.stat().st_size for file in REFERENCES.rglob("*") if file.is_file()) < 8e6
+    assert {folder for folder in members(REFERENCES)} == {str(reference_pool(name)) for name in list_tasks()}
+
+
+def test_learners_see_the_scene_unless_they_ask_for_less():
+    own = observations.proprioception("panda_jaw")
+    for given, expected in (
+        (None, (*own, "object-state")),
+        ("state", (*own, "object-state")),
+        ("pictures", (*own, *observations.CAMERAS)),
+        (["proprioception", "rgb_ego_cam", own[0]], (*own, "rgb_ego_cam")),
+    ):
+        env = PoolEnv("domino_single", REFERENCE, given)
+        assert set(env.observation_space.spaces) == set(expected), given
+
+
+def test_readings_are_found_by_their_names(env):
+    seen, info = env.reset(seed=1)
+    plain, row = env.unwrapped, Pool.open(REFERENCE).at(1)
+    tile, height = plain.entry("tile_0_pos"), plain.entry("tile_0_pos.z")
+    assert tile.of(seen) == pytest.approx(plain.world.pos("tile_0"), abs=1e-4) and height.of(seen) == tile.of(seen)[2:]
+    envs = gymnasium.make_vec("scengen/domino_single-v2", num_envs=2, pool=REFERENCE)
+    several, _ = envs.reset(options={"scenario": row.id})
+    assert np.array_equal(envs.entry("tile_0_pos").of(several), [tile.of(seen)] * 2)
+    for name in ("tile_0_poss", "tile_0_pos.w"):
+        with pytest.raises(UnknownName, match="no reading in these observations named .*did you mean 'tile_0_pos"):
+            plain.entry(name)
+
+
+def test_the_legend_names_every_number_of_every_vector():
+    env = PoolEnv("domino_single", REFERENCE, ["state", "force_torque", "robot0_tactile_left", "rgb_ego_cam"])
+    lines = env.legend.splitlines()
+    names = {line.split()[1] for line in lines if "[" in line.split()[0]}
+    vectors = {name: each for name, each in env.metadata["names"].items() if "tactile" not in name}
+    assert names == {entry.rpartition(".")[0] for entries in vectors.values() for entry in entries}
+    assert "object-state[26:29]      tile_0_pos                   x y z [m]" in lines
+    assert sum(entry.where.stop - entry.where.start for entry in map(env.entry, names)) == sum(map(len, vectors.values()))
+    assert {line.split(" ")[0] for line in lines if "[" not in line} == {"robot0_tactile_left", "rgb_ego_cam"}
+    assert max(map(len, lines)) <= 85
+
+
+@pytest.mark.parametrize("repeat, steps", [(1, 1200), (7, 172)])
+def test_the_specification_has_the_time_limit_in_steps(repeat, steps):
+    made = gymnasium.make("scengen/domino_single-v2", action_repeat=repeat)
+    assert made.spec.max_episode_steps == steps == made.unwrapped.max_episode_steps
+    assert "TimeLimit" not in str(made), "the environment truncates by itself, at the limit of the pool"
+    assert gymnasium.make_vec("scengen/domino_single-v2", num_envs=1, action_repeat=repeat).spec.max_episode_steps == steps
 
 
 def test_every_task_is_registered():
@@ -243,7 +306,6 @@ def test_what_is_no_action_never_reaches_the_simulator(env, action):
         (lambda: PoolEnv("domino_select", REFERENCE), PoolError, "of domino_single, not of domino_select"),
         (lambda: PoolEnv("domino_single", "nowhere"), PoolError, "no pool at nowhere"),
         (lambda: PoolEnv("domino_single", []), PoolError, "no pool was given; give pool=FOLDER"),
-        (lambda: gymnasium.make("scengen/domino_single-v2"), PoolError, "no pool was given; give pool=FOLDER"),
         (lambda: PoolEnv("domino_single", REFERENCE, split="idd"), UnknownName, "no split in these pools named 'idd'"),
         (
             lambda: PoolEnv("domino_single", REFERENCE, scenario="z"),

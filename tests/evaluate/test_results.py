@@ -196,6 +196,7 @@ def edit(results_folder, name, **entries):
         ({"edition": "v1"}, "names edition v1: "),
         ({"tasks": "packing"}, "and no edition"),
         ({"rollouts": 10**6}, "says rollouts = 1000000, and there are 12 lines"),
+        ({"seeds": 4}, "has no line: the table says seeds = 4, the lines have 3"),
     ],
 )
 def test_settings_of_the_table_that_contradict_the_run_are_found(results, tmp_path, entries, says):
@@ -258,11 +259,11 @@ def test_tables_for_people_in_another_encoding_are_not_those_of_the_lines(result
 
 def test_kept_actions_say_what_the_policy_perceived(results, tmp_path, capsys):
     folder = forged(results, tmp_path, "kept", lines_of(results / "kept"), False)
-    changed = folder / "rollouts-proprioception_noise@2" / "reference"
+    changed = folder / "rollouts-proprioception_noise@2" / helpers.REFERENCE.name
     assert cli.run(["verify", f"pool={changed}"]) == 0
     assert "'random' drove the robot under 'proprioception_noise@2', seed 0" in capsys.readouterr().out
     told = json.loads((changed / DEMONSTRATIONS).read_text())
-    assert "condition" not in json.loads((folder / "rollouts" / "reference" / DEMONSTRATIONS).read_text())
+    assert "condition" not in json.loads((folder / "rollouts" / helpers.REFERENCE.name / DEMONSTRATIONS).read_text())
     for entries, says in (
         ({"condition": "proprioception_noise@1"}, "says condition = 'proprioception_noise@1'"),
         ({"perturb_seed": 3}, "says perturb_seed = 3"),

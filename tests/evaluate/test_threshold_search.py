@@ -338,15 +338,19 @@ def test_a_search_with_chosen_rollouts_is_refuted(found, tmp_path, forge, capsys
     assert cli.run(["verify", f"results={tmp_path / 'forged'}"]) == 1
 
 
-@pytest.mark.parametrize("name", ["along", "success", "levels"])
-def test_a_table_of_another_search_is_refuted(found, tmp_path, name):
+@pytest.mark.parametrize("name", ["along", "success", "levels", "seed"])
+def test_a_table_of_another_search_is_refuted(found, tmp_path, name, capsys):
     folder, _ = found
     shutil.copytree(folder / "whole", tmp_path / "other")
     path = tmp_path / "other" / "table.json"
     table = json.loads(path.read_text())
-    table["settings"][name] = {"along": "object_noise", "success": 0.4, "levels": 5}[name]
+    table["settings"][name] = {"along": "object_noise", "success": 0.4, "levels": 5, "seed": 3}[name]
     path.write_text(json.dumps(table))
     assert cli.run(["verify", f"results={tmp_path / 'other'}"]) in (1, 2)
+    if name == "seed":
+        told = capsys.readouterr().err
+        assert "table.json is of a search with seed = 3, run.json of one with 7400" in told
+        assert "is missing" not in told
 
 
 def test_pools_at_other_points_of_the_axis_are_refused(tmp_path):

@@ -1,6 +1,7 @@
 """Worlds for other simulators hold everything that C MuJoCo needs for the bits of the scenarios."""
 
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import mujoco
@@ -84,8 +85,10 @@ def test_the_files_say_which_scenarios_they_hold_and_that_no_certificate_holds(m
     }
 
 
-def test_the_same_scenarios_give_the_same_bytes(made, tmp_path):
+def test_the_same_scenarios_give_the_same_bytes(made, tmp_path, capsys):
     assert exported(tmp_path / "again", "layout=1") == 0
+    assert exported(tmp_path / "again", "layout=1") == 0
+    assert "holds these 2 worlds of 27 bodies already" in capsys.readouterr().out
     for path in (path for path in made.rglob("*") if path.is_file()):
         assert (tmp_path / "again" / path.relative_to(made)).read_bytes() == path.read_bytes()
 
@@ -99,7 +102,7 @@ def test_splits_of_a_task_share_a_batch(tmp_path):
     for number in numbers:
         assert exported(tmp_path / str(number), f"layout={number}", pool=both) == 0
     found = [np.load(tmp_path / str(number) / batch.WORLDS)["id"].tolist() for number in numbers]
-    assert mates in found and sorted(sum(found, [])) == sorted(world.row.id for world in layouts)
+    assert mates in found and sorted(chain(*found)) == sorted(world.row.id for world in layouts)
     assert [len(ids) for ids in found] == sorted(map(len, found), reverse=True)
 
 
@@ -112,7 +115,7 @@ def test_splits_of_a_task_share_a_batch(tmp_path):
         (["format=mjb"], "no format named 'mjb'"),
         (["layout=2", "format=mjcf"], "layout = 2; only format=batch has layouts"),
         ([f"pool={REFERENCE},{MIRROR}"], "one task, and the pools have domino_single, mirror_pick_place"),
-        ([f"to={REFERENCE}"], "is not empty; delete it, or name another folder"),
+        (["layout=1", f"to={REFERENCE}"], "is not empty: it holds manifest.json; delete it"),
     ],
 )
 def test_bad_input_is_one_line(given, why, tmp_path, capsys):

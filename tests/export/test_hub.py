@@ -139,12 +139,25 @@ def test_a_certificate_that_does_not_hold_gets_no_card(tmp_path, capsys):
     assert "only pools that verify are published, see scengen verify pool=" in err and not (tmp_path / "out").exists()
 
 
+def test_a_repeated_command_finds_its_folder_and_another_one_is_refused(made, capsys, tmp_path):
+    copied = shutil.copytree(made, tmp_path / "copy")
+    assert card(*POOLS, to=copied, license="cc-by-4.0") == 0
+    assert "copy holds this data set already: README.md and 2 scenarios" in capsys.readouterr().out
+    assert card(*POOLS, to=copied, license="mit") == 2
+    assert "is not empty: it holds README.md; delete it, or name another folder" in capsys.readouterr().err
+    assert card(POOLS[0], to=copied) == 2
+    assert "is not empty: it holds mirror_pick_place-id" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
         ([], "export hub needs pool=...; see scengen export hub --help"),
         (["pool=nowhere"], "no pool at nowhere"),
-        ([f"pool={REFERENCE}", f"to={REFERENCE}"], "is not empty; delete it, or name another folder"),
+        (
+            [f"pool={REFERENCE}", f"to={REFERENCE}"],
+            "is not empty: it holds manifest.json; delete it, or name another folder",
+        ),
         ([f"pool={REFERENCE}", "level=all"], "level = all; it must be replay or recheck or full"),
         (
             [f"pool={REFERENCE},{BASE / 'single_quick'}"],

@@ -426,7 +426,8 @@ def test_without_cameras_neither_opengl_nor_pyav_is_needed(tmp_path, monkeypatch
         (["cameras=rgb_ego_cam,rgb_griper_cam"], "no camera named 'rgb_griper_cam'"),
         (["width=641"], "width = 641; the width and height of a video must be even numbers"),
         (["n=0"], "n = 0; it must be at least 1"),
-        ([f"to={REFERENCE}"], "exists already"),
+        ([f"to={REFERENCE}"], "is a pool already (manifest.json); choose another to="),
+        ([f"to={Path(__file__).parent}"], "exists already and is no recording; delete it, or give another name"),
         (["to=/dev/null/out"], "cannot be written"),
         (["pool=nowhere"], "no pool at nowhere"),
     ],
@@ -436,3 +437,30 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, capsys, arguments, s
     assert cli.run(given) == 2
     err = capsys.readouterr().err
     assert says in err and err.count("\n") == 1 and not list(tmp_path.iterdir())
+
+
+def written(target):
+    return {path: path.stat().st_mtime_ns for path in (target, *target.rglob("*")) if path.is_file()}
+
+
+@pytest.mark.parametrize("format_", ["lerobot", "robomimic"])
+def test_a_repeated_recording_is_there_already_and_another_one_is_refused(tmp_path, capsys, format_):
+    target = tmp_path / "made.hdf5"
+    command = ["record", f"pool={REFERENCE}", f"to={target}", "cameras=none", "n=1", f"format={format_}"]
+    assert cli.run(command) == 0
+    before = written(target)
+    lock = Path(f"{target}.unfinished.lock")
+    lock.touch()  # left by a command that was killed after its last step
+    assert cli.run(command) == 0
+    assert "made.hdf5 holds this recording already: 1 episodes" in capsys.readouterr().out and not lock.exists()
+    assert written(target) == before
+    assert cli.run([*command, "environment_state=false"]) == 2
+    assert "exists already and has other settings.environment_state; delete it" in capsys.readouterr().err
+
+
+def test_a_repeated_recording_tells_again_what_failed(tmp_path, capsys, witnesses):
+    cut = replace(witnesses[0], witness=witnesses[0].witness[:50])
+    write_pool(tmp_path / "cut", Pool.open(REFERENCE).manifest.without_files(), [cut])
+    command = ["record", f"pool={tmp_path / 'cut'}", f"to={tmp_path / 'out'}", "cameras=none", "fps=5"]
+    assert [cli.run(command), cli.run(command)] == [1, 1]
+    assert capsys.readouterr().err.count(f"FAILED {cut.name}") == 2

@@ -27,7 +27,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]  # as a program it has only its own folder there
-REFERENCE = ROOT / "generated" / "reference"
+REFERENCE = ROOT / "generated" / "reference" / "domino_single-id"
 WAYS = ("SIGKILL", "SIGTERM", "SIGINT", "worker", "disk")
 """Kill the group; tell the run to stop; press Ctrl-C; kill one worker; let no file grow beyond a size."""
 ALONE = ("SIGKILL", "SIGTERM", "SIGINT")
@@ -82,6 +82,8 @@ KINDS = {
         ("agent", "model=facts", "pool={pool}", "stage=2", "pictures=false"), "to", ("results-2.jsonl", "table-2.json")
     ),
     "attack": Kind(("attack", "task=domino_single", "n=3", "budget=150"), "to", ("attack.jsonl",), workers=True),
+    "hub": Kind(("export", "hub", "pool={pool}"), "to", ("README.md", "*/*"), workers=True),
+    "batch": Kind(("export", "pool={pool}", "format=batch", "layout=1"), "to", ("*.*", "meshes/*")),
     "subset": Kind(("subset", "pool={pool}", "n=3"), "to", ("manifest.json", "*.parquet")),
 }
 STUDIO = "studio"

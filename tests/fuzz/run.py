@@ -25,7 +25,7 @@ from scengen import cli  # noqa: E402
 from scengen.cli.program import MAX_LINE  # noqa: E402
 from scengen.cli.verbs import file_stem  # noqa: E402
 
-REFERENCE = ROOT / "generated" / "reference"
+REFERENCE = ROOT / "generated" / "reference" / "domino_single-id"
 LIMIT = 60
 """Processor time of one command line [s]: more than any needs that does no work."""
 WALL_LIMIT = 600

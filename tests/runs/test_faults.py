@@ -315,3 +315,19 @@ def test_a_run_that_loses_every_scenario_ends_and_says_why(tmp_path, capsys, mon
     assert cli.run(["generate", "task=domino_single", "n=3", *slow, f"pool={tmp_path / 'pool'}"]) == 2
     told = "2 scenarios in a row have no verdict, the last because it took longer than 1 s"
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("separate", [False, True])
+def test_a_sorted_log_does_not_tell_when_records_were_added(tmp_path, separate):
+    contents = []
+    for name, numbers in (("a", (2, 1, 3)), ("b", (3, 2, 1))):
+        head = tmp_path / f"{name}.json" if separate else None
+        with Log(tmp_path / f"{name}.jsonl", {"of": 3}, head=head) as log:
+            for number in numbers:
+                log.add({"number": number})
+            log.sort(lambda record: record["number"])
+            log.add({"number": 4})
+        contents.append((tmp_path / f"{name}.jsonl").read_text().splitlines())
+    assert contents[0] == contents[1] and len(contents[0]) == 4 + (not separate)
+    with Log(tmp_path / "a.jsonl", {"of": 3}, head=tmp_path / "a.json" if separate else None) as log:
+        assert [record["number"] for record in log.records] == [1, 2, 3, 4]

@@ -95,7 +95,7 @@ def test_every_link_within_the_site_leads_somewhere(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["task=domino_single", "pool=generated/reference"], "give either task=NAME"),
+        (["task=domino_single", "pool=generated/reference/domino_single-id"], "give either task=NAME"),
         (["task=domino_singl"], "did you mean 'domino_single'"),
         (["pool=nowhere"], "nowhere"),
         (["task=domino_single", "to=README.md"], "is a file; name a folder"),

@@ -1,14 +1,14 @@
 """search with the built-in adversary for unintended ways to reach a goal"""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
 
 from ... import compose
 from ...attack.adversary import LEAKS, TIERS
-from ...attack.campaign import AttackReport, AttackSettings, Subject, attack, certified, drawn
+from ...attack.campaign import AttackReport, AttackSettings, Subject, attack, certified, check_budget, drawn
 from ...attack.evidence import spelled
 from ...attack.priors import Prior
 from ...errors import BadConfig
@@ -35,6 +35,7 @@ def command(arguments: Arguments) -> int:
     try_file(settings.json)
     try_folder(settings.to)
     task, pool = _task(arguments, settings)
+    check_budget("budget", settings.budget, settings.n if pool is None else min(settings.n, len(pool)))
     folder = Path(settings.to or f"generated/attack/{task.name}")
     try_folder(folder)
     plain = asdict(_leaks(task, settings)) if settings.observed else None
@@ -112,7 +113,15 @@ def _remarks(report: AttackReport, names: Mapping[str, str]) -> list[str]:
         f"not tried {times} times: {name} ({spelled(raw)}): {reason}" for (name, raw, reason), times in counts.items()
     ]
     lost = [f"unknown: the attack on {names[id_]} {why}" for id_, _, why in (one.partition(" ") for one in report.lost)]
-    return [*map(_fixed_answers, report.priors), *untried, *lost]
+    return [*map(_fixed_answers, report.priors), *_resumed(report), *untried, *lost]
+
+
+def _resumed(report: AttackReport) -> Iterator[str]:
+    """A line about filtered hits whose actions the filter cannot give from the start of the episode."""
+    filtered = [hit for hit in report.hits if not hit.raw]
+    if count := sum(hit.resumed for hit in filtered):
+        why = "where the filter started at rest; filtered from the start, their actions would be others"
+        yield f"{count} of {len(filtered)} filtered hits continue from a state of the witness, {why}"
 
 
 def _fixed_answers(prior: Prior) -> str:

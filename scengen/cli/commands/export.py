@@ -13,7 +13,7 @@ from ...pool import Pool, PoolRow
 from ...pool.library import Library
 from ...runs.progress import ProgressBar
 from ...work.parallel import UNTRUSTED_LIMITS, each
-from ...work.targets import check_new_folder, try_folder
+from ...work.targets import clear_unfinished, try_folder
 from . import FAILED, OK, Arguments, chosen, err, filled, holder, one, say, several, warn
 from .settings import read
 
@@ -64,7 +64,11 @@ def _scenes(settings: ExportSettings) -> int:
 
 def _worlds(settings: ExportSettings) -> int:
     """Write the scenarios of one task and layout together."""
-    check_new_folder(settings.to)
+    target = Path(settings.to)
+    if not target.name:
+        raise BadConfig(f"to = {settings.to}; name a new folder for the worlds")
+    clear_unfinished(target)
+    try_folder(target)
     if settings.id is None:
         pools = [filled(folder) for folder in several(settings.pool)]
         rows: Sequence[PoolRow] = Library(pools)
@@ -77,8 +81,8 @@ def _worlds(settings: ExportSettings) -> int:
     if not worlds:
         return FAILED
     found = of_layout(worlds, settings.layout)
-    write_batch(found, Path(settings.to))
-    say(f"wrote {len(found)} worlds of {len(found[0].fields['body_mass'])} bodies to {settings.to}")
+    what = f"{len(found)} worlds of {len(found[0].fields['body_mass'])} bodies"
+    say(f"wrote {what} to {target}" if write_batch(found, target) else f"{target} holds these {what} already")
     say(NOTE)
     return FAILED if lost else OK
 

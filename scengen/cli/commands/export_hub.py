@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ...attack.check import attacked
 from ...errors import BadConfig, PoolError, cut
-from ...export.hub import DatasetCard, PublishedPool, check_pools, own_license, publish
+from ...export.hub import DatasetCard, PublishedPool, check_pools, check_target, own_license, publish
 from ...pool import Pool
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
@@ -15,7 +15,6 @@ from ...validate.verify.recheck import LEVELS
 from ...work.limits import at_least
 from ...work.parallel import Workers
 from ...work.printed import printable
-from ...work.targets import check_new_folder
 from . import OK, Arguments, err, say, several
 from .settings import read
 from .verify import verified, without_expired
@@ -45,9 +44,9 @@ def command(arguments: Arguments) -> int:
     for name in ("title", "license"):
         if (text := getattr(settings, name)) is not None and (not text.strip() or printable(text) != text):
             raise BadConfig(f"{name} = {cut(repr(text))}; it must be one line of text without control characters")
-    check_new_folder(settings.to)
     pools = [Pool.open(folder).check() for folder in several(settings.pool)]
     check_pools(pools)
+    check_target(Path(settings.to), pools)
     seed = secrets.randbelow(2**32)
     options = Options(settings.level, settings.sample, True, seed, settings.workers, LIMITS, attacked)
     published = []
@@ -62,9 +61,10 @@ def command(arguments: Arguments) -> int:
         published.append(PublishedPool(pool, report.settings, _verification(report)))
     tasks = dict.fromkeys(pool.task for pool in pools)
     title = settings.title or f"scengen: {', '.join(tasks)}"
-    publish(DatasetCard(published, title, settings.license or own_license()), Path(settings.to))
+    made = publish(DatasetCard(published, title, settings.license or own_license()), Path(settings.to))
     names = ", ".join(one.name for one in published)
-    say(f"wrote {settings.to}: README.md and {sum(map(len, pools))} scenarios as {names}")
+    written = f"wrote {settings.to}" if made else f"{settings.to} holds this data set already"
+    say(f"{written}: README.md and {sum(map(len, pools))} scenarios as {names}")
     say(f"datasets.load_dataset({settings.to!r}, {published[0].name!r}) opens one; upload the folder as it is")
     return OK
 

@@ -11,7 +11,7 @@ from ...conformance.rules import SNAKE_CASE
 from ...errors import BadConfig, cut
 from ...samplers import task_files
 from ...samplers.task_files import shipped
-from ...work.targets import try_folder, write
+from ...work.targets import foreign, try_folder, write
 from . import OK, Arguments, say
 from .settings import read
 
@@ -53,13 +53,16 @@ def command(arguments: Arguments) -> int:
     settings.check()
     folder = Path(settings.to or settings.package)
     try_folder(folder)
-    if folder.is_dir() and any(folder.iterdir()):
-        raise BadConfig(f"{cut(str(folder))} is not empty; give a new folder as to=FOLDER")
-    names = _names(settings.task, settings.package)
-    template = shipped(TEMPLATE)
-    for path in sorted(template.rglob("*")):
-        if path.is_file() and path.suffix in SUFFIXES:
-            write(folder / _renamed(str(path.relative_to(template)), names), _renamed(path.read_text(), names))
+    names, template = _names(settings.task, settings.package), shipped(TEMPLATE)
+    copied = (path for path in sorted(template.rglob("*")) if path.is_file() and path.suffix in SUFFIXES)
+    files = {
+        _renamed(path.relative_to(template).as_posix(), names): _renamed(path.read_text(), names).encode()
+        for path in copied
+    }
+    if other := foreign(folder, files):
+        raise BadConfig(f"{cut(str(folder))} is not empty: it holds {cut(other)}; give a new folder as to=FOLDER")
+    for name, content in files.items():
+        write(folder / name, content)
     say(f"wrote the package {settings.package} with the task {settings.task}; continue with {folder / 'README.md'}")
     return OK
 

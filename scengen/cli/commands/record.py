@@ -59,10 +59,9 @@ def _record(settings: RecordSettings, arguments: Arguments) -> int:
         except KeyboardInterrupt:
             warn(f"scengen: interrupted; nothing was written to {settings.to}")
             return INTERRUPTED
-    say(
-        f"wrote {summary.episodes} episodes, {summary.rows} rows at {settings.rate} per second, "
-        f"{len(settings.camera_names)} cameras to {settings.to}"
-    )
+    what = f"{summary.episodes} episodes, {summary.rows} rows at {settings.rate} per second"
+    made = f"{what}, {len(settings.camera_names)} cameras"
+    say(f"{settings.to} holds this recording already: {made}" if summary.earlier else f"wrote {made} to {settings.to}")
     for scenario in summary.failed:
         warn(f"FAILED {scenario}: its actions do not reach the goal here; its episode has success = false")
     for scenario, why in summary.lost.items():

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ... import compose
-from ...attack.evidence import OTHER_SCENARIO, Hit
+from ...attack.evidence import OTHER_SCENARIO, Hit, scenario_of
 from ...envs.observations import ALL, cameras_of
 from ...episode import check_rules
 from ...errors import BadConfig
@@ -175,7 +175,7 @@ def _take_of_hit(settings: FilmSettings, arguments: Arguments) -> tuple[Take, Wo
     task = (
         task_of(Pool.open(str(settings.pool)).check(), search) if settings.pool else compose.load_task(hit.task, search)
     )
-    scenario = task.scenario(hit.params)
+    scenario = scenario_of(hit, task)
     if scenario.id != hit.scenario:
         raise BadConfig(f"hit = {settings.hit}: {OTHER_SCENARIO}")
     say(str(hit))

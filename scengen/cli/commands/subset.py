@@ -16,7 +16,7 @@ from ...pool.manifest import MANIFEST, Manifest
 from ...pool.writing import write_pool
 from ...samplers.task_files import search_path
 from ...validate import lock
-from ...work.targets import appearing, check_unfinished, try_folder
+from ...work.targets import appearing, clear_unfinished, try_folder
 from . import OK, Arguments, filled, one, say
 from .settings import read
 
@@ -40,7 +40,7 @@ def command(arguments: Arguments) -> int:
             f"n = {settings.n}; it must lie in [1, {len(pool)}], because {pool.folder} has {len(pool)} scenarios"
         )
     check_target(target, MANIFEST)
-    check_unfinished(target)
+    clear_unfinished(target)
     try_folder(target)
     task = task_of(pool, search_path(arguments))
     batch = batch_of(task, pool)

@@ -24,7 +24,7 @@ from ...sim.world import World
 from ...validate.playable import check_row
 from ...validate.rebuilt import rebuild
 from ...validate.rollout import Jitter, Rollout, replay, run, try_shortcut
-from ...validate.settings import CertifySettings
+from ...validate.settings import MAX_RUNS, CertifySettings
 from ...work.limits import at_least
 from ...work.targets import try_file
 from ...work.typed import typed
@@ -40,8 +40,6 @@ FILMS = (".png", ".mp4")
 """Suffixes of films: a strip and a video."""
 TARGETS = ("goal", "target", "spot")
 """Names by which moves call the place where the hand or a body shall go [m]."""
-MAX_RUN = 1000
-"""Largest number of a jittered run, as of `certify.robust.runs`."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +85,8 @@ class TrySettings:
         word, colon, number = self.what.partition(":")
         if word != JITTER:
             return None
-        if not colon or not re.fullmatch(r"\d{1,4}", number, re.ASCII) or int(number) >= MAX_RUN:
-            known = f"{JITTER}:0 to {JITTER}:{MAX_RUN - 1}"
+        if not colon or not re.fullmatch(r"\d{1,4}", number, re.ASCII) or int(number) >= MAX_RUNS:
+            known = f"{JITTER}:0 to {JITTER}:{MAX_RUNS - 1}"
             raise BadConfig(f"what = {cut(self.what)}; give a jittered run by its number, {known}")
         return int(number)
 

@@ -20,7 +20,7 @@ from ...samplers.task import Draw, Task
 from ...validate.certify import Trial
 from ...validate.labels import made_with
 from ...validate.settings import CertifySettings
-from ...work.limits import at_least
+from ...work.limits import at_least, check_count
 from ...work.targets import write
 from ..generate import FAILED, GIVEN_UP, KEPT, DemosSummary, finish, first_failed, row_of
 from .devices import kind_of
@@ -61,6 +61,7 @@ class TeleopSettings:
         """Raise `ScengenError` for settings that are not valid."""
         check_rules(self.rules)
         at_least(self, seed=0, index=0, n=1, limit=1, width=64, height=64)
+        check_count(self.n, self.limit, None, "", "demonstrations")
         if not 1 <= self.takes <= 1000:
             raise BadConfig(f"takes = {self.takes}; it must lie in [1, 1000]")
         if not re.fullmatch(OPERATOR, self.operator):

@@ -8,7 +8,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from ...envs.gym import action_repeat_at
-from ...envs.observations import proprioception
+from ...envs.observations import requested
 from ...errors import BadConfig, UnknownName, cut
 from ...samplers.task_files import conf_dir
 from ...work.plain import read_yaml
@@ -19,7 +19,6 @@ PROTOCOLS = {"ws": "openpi", "wss": "openpi", "zmq": "gr00t"}
 """Names of the protocols, and of their files in conf/clients, by the scheme of an address."""
 INSTRUCTION = "instruction"
 """Name of the instruction of the running scenario among the observations of a file."""
-PROPRIOCEPTION = "proprioception"
 """Name of all streams of the robot's own pose among the observations of a file."""
 
 
@@ -103,10 +102,7 @@ class ClientSettings:
 
     def parts(self, entry: str, embodiment: str) -> tuple[str, ...]:
         """Names of the streams and cameras of an entry for a robot."""
-        found: list[str] = []
-        for name in self.observation[entry]:
-            found += proprioception(embodiment) if name == PROPRIOCEPTION else [name]
-        return tuple(found)
+        return requested(self.observation[entry], embodiment)
 
     def identity(self) -> dict[str, Any]:
         """The settings on which the outcome of an episode depends."""

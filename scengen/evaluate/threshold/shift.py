@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...compose import load_task
-from ...envs.observations import cameras_of, proprioception
+from ...envs.observations import cameras_of, requested
 from ...errors import BadConfig, UnknownName
 from ...evidence import ledger
 from ...look.looks import look_named
@@ -98,11 +98,11 @@ class Shift:
         """Raise `BadConfig` if a perturbation affects nothing that a policy observes.
 
         Args:
-            names: names of streams and cameras; None for proprioception.
+            names: names of streams and cameras; None for those of environments.
             look: look of pictures.
         """
         robot = self.task.embodiment
-        observed, cameras = proprioception(robot) if names is None else names, cameras_of(robot)
+        observed, cameras = requested(names, robot), cameras_of(robot)
         shown = [cameras[name] for name in observed if name in cameras]
         streams = [name for name in observed if name not in cameras]
         Perturbation.parse(self.perturbation(1)).check(streams, shown, look_named(look))

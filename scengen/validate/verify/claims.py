@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...certificate import CHECKS, Check, as_json, from_json
-from ...control.loop import Loop
+from ...control.loop import ACTION, Loop
 from ...control.teleop import ALPHA, LARGEST_CHANGE, MOTION
 from ...errors import Infeasible, ScengenError
 from ...params import canonical
@@ -343,8 +343,8 @@ def passed_filter(witness: np.ndarray) -> bool:
     """Whether the teleoperation filter can give these actions, starting from rest."""
     if np.abs(witness).max(initial=0.0) > 1.0:
         return False
-    motion = witness[:, :MOTION].astype(float)
-    before = np.vstack([np.zeros((1, MOTION)), motion])[:-1]
+    motion = witness.reshape(len(witness), -1, ACTION)[..., :MOTION].astype(float)
+    before = np.concatenate([np.zeros_like(motion[:1]), motion[:-1]])
     lowest = np.maximum(-LARGEST_CHANGE, ALPHA * (-1.0 - before))
     highest = np.minimum(LARGEST_CHANGE, ALPHA * (1.0 - before))
     change = motion - before
