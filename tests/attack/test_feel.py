@@ -27,7 +27,7 @@ def carried_out(world, plan):
 def world():
     scenario = load_task("domino_single").draw("id", 11, 0).scenario
     found = world_of(scenario)
-    carried_out(found, go_to(found.arm, found.arm.hand + [0.0, 0.25, -0.12], facing_down()))
+    carried_out(found, go_to(found.arm, np.add(found.arm.hand, [0.0, 0.25, -0.12]), facing_down()))
     return found
 
 
