@@ -140,8 +140,8 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
 
         Args:
             actions: shape (num_envs, size of an action).
-            draw: slots whose pictures are drawn, shape (num_envs,), so that unused pictures take no time. All others are
-                black, except those of a new episode and of cameras that are late. None for all slots.
+            draw: slots whose pictures are drawn, shape (num_envs,), so that unused pictures take no time. All others
+                are black, except those of a new episode and of cameras that are late. None for all slots.
 
         Raises:
             ValueError: the actions have another shape, or one is not finite. Nothing is simulated then.

@@ -47,6 +47,10 @@ class Spent(NamedTuple):
     drawing: float = 0.0
     """Part of the time that they took [s]."""
 
+    def plus(self, other: "Spent") -> "Spent":
+        """The sum of two."""
+        return Spent(self.seconds + other.seconds, self.pictures + other.pictures, self.drawing + other.drawing)
+
     def __str__(self) -> str:
         share = f"{self.drawing / self.seconds:.0%}" if self.seconds else "0%"
         return f"drawing took {share} of the time: {self.pictures} pictures in {self.drawing:.1f} s"

@@ -194,7 +194,7 @@ class Run(LineLog):
         self.progress(done, len(some))
         self.player.strict = not self.log.records
         for count, record in enumerate(_played(self.player, todo), done + 1):
-            self.spent = Spent(*map(sum, zip(self.spent, record.pop("spent", Spent()), strict=True)))
+            self.spent = self.spent.plus(record.pop("spent", Spent()))
             played = record.pop("played", None)
             if played is not None:
                 self.keep(id_of(record), played)
