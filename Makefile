@@ -5,7 +5,7 @@ BIN := $(ENV)/bin
 READY := $(ENV)/.ready
 DEMO := generated/demo
 
-.PHONY: setup demo ci test wheel stored slow durations readme fuzz kills check types format certify stacks stack-sample readers integrations figures axes beliefs attacks drift baselines curves docs docs-links results pictures site reference bench clean checker checker-base mutants behaviour behaviour-check tag
+.PHONY: setup demo ci test wheel stored slow durations readme fuzz kills check types format certify stacks stack-sample warp readers integrations figures axes beliefs attacks drift baselines curves docs docs-links results pictures site reference bench clean checker checker-base mutants behaviour behaviour-check tag
 
 setup: $(READY)
 
@@ -123,6 +123,11 @@ stacks: setup
 # A sample on MuJoCo 4 with numpy 2 and the Python of make setup (3 minutes).
 stack-sample: setup
 	$(BIN)/python tools/stacks.py sample
+
+# Exports certified scenarios as worlds, plays their witnesses by joint targets in mujoco_warp on the processor, and stores how often goal
+# and end agree with C MuJoCo (4 minutes for each task). TASKS="packing edge_slide" selects tasks.
+warp: setup
+	$(BIN)/python tools/warp_worlds.py $(TASKS)
 
 # Opens recordings of every embodiment with LeRobot, robomimic, lerobot-doctor and lerobot-lint in environments of their own, which come
 # from the package index (Python 3.12, gigabytes), and writes docs/readers.md.

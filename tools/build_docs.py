@@ -45,6 +45,7 @@ FILLS: Mapping[str, Callable[[], Mapping[str, str]]] = {
     "paper": tables.paper,
     "perturb": tables.control,
     "predictors": predictors.fills,
+    "view": tables.warp,
 }
 """Functions that return the tables of a page of docs/ by the names of their marks."""
 CONTENTS = ("docs/index.md", "docs/tasks.md", "docs/api.md")

@@ -3,6 +3,7 @@
 import ast
 import importlib
 import inspect
+import json
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -51,6 +52,10 @@ CLAUSES = (
 """Titles of the table of clauses."""
 COSTS = ("task", "one [core s]", "10 thousand [core hours]", "1 million [core days]", "10 million [core days]")
 """Titles of the table of costs."""
+AGREEMENT = ("task", "witnesses", "goal reached", "same verdict", "ends within 1 cm", "largest distance, median [mm]")
+"""Titles of the table of witnesses in mujoco_warp."""
+WARP = Path(__file__).parents[1] / "records" / "warp"
+"""Folder of the results of `make warp`."""
 HOUR, DAY = 3600.0, 86_400.0
 
 
@@ -178,6 +183,17 @@ def drift() -> dict[str, str]:
     rows = [row for task in list_tasks() for row in ledger.newest("drift", task)]
     sets = sorted({tuple(row.made_with["mujoco"]) for row in rows})
     return {"drift": "\n".join(_drifted(names, [row for row in rows if row.has(mujoco=[*names])]) for names in sets)}
+
+
+def warp() -> dict[str, str]:
+    """Witnesses in mujoco_warp: how often goal and end agree with C MuJoCo."""
+    lines = []
+    for path in sorted(WARP.glob("*.json")):
+        found = json.loads(path.read_text())
+        if found["version"] == load_task(found["task"]).version:
+            cells = (str(found[name]) for name in ("n", "goals", "verdicts", "near"))
+            lines.append([link(found["task"]), *cells, f"{1000 * found['median']:g}"])
+    return {"warp": table(AGREEMENT, lines)}
 
 
 def control() -> dict[str, str]:

@@ -26,7 +26,7 @@ from ..work.parallel import each
 from ..work.targets import move_aside, try_folder
 from .arms import BENIGN, automatic_arms
 from .lines import CHAIN, COLUMNS, FORMAT, RUN, chained, renewed, run_sha256
-from .player import PolicyPlayer, policy_seed
+from .player import PolicyPlayer, Spent, policy_seed
 from .scenarios import Scenarios, chosen, not_playable
 from .settings import Condition, EvaluateSettings, RolloutId, T, completed
 
@@ -52,6 +52,8 @@ class Evaluation:
     """Hash at the end of the file of episodes, see `lines.chained`."""
     drawn: Mapping[str, str] = field(default_factory=dict)
     """Hashes of the pools that a search for a threshold has drawn, by folder."""
+    spent: Spent = field(default_factory=Spent)
+    """Time of the rollouts that were played now, if there are cameras."""
 
 
 def evaluate(
@@ -85,7 +87,7 @@ def evaluate(
         run.play(wanted(about, settings, arms := run.arms()))
         run.sort()
         pinned = {str(pool.folder): pool.sha256 for pool in fresh}
-        return Evaluation(run.lines(), run.earlier, lost, arms, pinned, run.chain)
+        return Evaluation(run.lines(), run.earlier, lost, arms, pinned, run.chain, spent=run.spent)
 
 
 def ready(settings: T) -> T:
@@ -176,6 +178,8 @@ class Run(LineLog):
     """Called with the number of rollouts done, and their total."""
     earlier: int = 0
     """Number of episodes that an earlier run played."""
+    spent: Spent = field(default_factory=Spent)
+    """Time of the rollouts that this run played, if there are cameras."""
     wanted: set[RolloutId] = field(default_factory=set)
     """All rollouts of the run."""
 
@@ -190,6 +194,7 @@ class Run(LineLog):
         self.progress(done, len(some))
         self.player.strict = not self.log.records
         for count, record in enumerate(_played(self.player, todo), done + 1):
+            self.spent = self.spent.plus(record.pop("spent", Spent()))
             played = record.pop("played", None)
             if played is not None:
                 self.keep(id_of(record), played)

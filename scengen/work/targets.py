@@ -198,6 +198,12 @@ def foreign(folder: Path, files: Mapping[str, bytes | Path]) -> str:
     return ""
 
 
+def check_same(folder: Path, files: Mapping[str, bytes | Path]) -> None:
+    """Raise `BadConfig` if a folder holds anything `foreign`."""
+    if other := foreign(folder, files):
+        raise BadConfig(f"{folder} is not empty: it holds {cut(other)}; delete it, or name another folder")
+
+
 def _same(path: Path, made: bytes | Path) -> bool:
     return filecmp.cmp(path, made, shallow=False) if isinstance(made, Path) else path.read_bytes() == made
 

@@ -4,7 +4,7 @@ import pytest
 
 from scengen import cli
 from scengen.errors import BadConfig
-from scengen.validate.certify import lower_bound
+from scengen.validate.settings import lower_bound
 from scengen.validate.settings import CertifySettings, Robust
 
 DOMINO = "task=domino_single"
