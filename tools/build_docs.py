@@ -43,7 +43,7 @@ FILLS: Mapping[str, Callable[[], Mapping[str, str]]] = {
     "drift": tables.drift,
     "kept_cheats": tables.kept_cheats,
     "paper": tables.paper,
-    "perturb": tables.control,
+    "perturb": tables.perturb,
     "predictors": predictors.fills,
     "view": tables.warp,
 }
