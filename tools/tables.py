@@ -188,7 +188,6 @@ def drift() -> dict[str, str]:
     return {"drift": "\n".join(_drifted(names, [row for row in rows if row.has(mujoco=[*names])]) for names in sets)}
 
 
-<<<<<<< HEAD
 def warp() -> dict[str, str]:
     """Witnesses in mujoco_warp: how often goal and end agree with C MuJoCo."""
     lines = []
@@ -200,8 +199,6 @@ def warp() -> dict[str, str]:
     return {"warp": table(AGREEMENT, lines)}
 
 
-def control() -> dict[str, str]:
-=======
 def perturb() -> dict[str, str]:
     """The tables of docs/perturb.md."""
     return {"control": _control(), "disturbed": _disturbed()}
@@ -231,7 +228,6 @@ def _solved(value: Mapping[str, Any], condition: str) -> str:
 
 
 def _control() -> str:
->>>>>>> disturb
     """Conditions of control that each task bears: for each kind the scenarios certified at levels 1 to 5."""
     lines = []
     for task in list_tasks():

@@ -4,8 +4,7 @@ import pytest
 
 from scengen import cli
 from scengen.errors import BadConfig
-from scengen.validate.settings import lower_bound
-from scengen.validate.settings import CertifySettings, Robust
+from scengen.validate.settings import CertifySettings, Robust, lower_bound
 
 DOMINO = "task=domino_single"
 REFERENCE = "pool=generated/reference/domino_single-id"
