@@ -63,6 +63,21 @@ def to_mjcf(spec: mujoco.MjSpec) -> str:
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
+def to_plain_mjcf(spec: mujoco.MjSpec) -> ET.Element:
+    """A compiled scene as MJCF that plain MuJoCo reads alike in every version: it states the flag `multiccd`.
+
+    Raises:
+        ValueError: MuJoCo cannot write the scene.
+    """
+    root = ET.fromstring(to_mjcf(spec))
+    option = root.find("option")
+    option = ET.SubElement(root, "option") if option is None else option
+    flags = option.find("flag")
+    flags = ET.SubElement(option, "flag") if flags is None else flags
+    flags.set("multiccd", flags.get("multiccd", "disable"))
+    return root
+
+
 def from_mjcf(text: str) -> mujoco.MjSpec:
     """A scene from its text.
 

@@ -43,8 +43,9 @@ FILLS: Mapping[str, Callable[[], Mapping[str, str]]] = {
     "drift": tables.drift,
     "kept_cheats": tables.kept_cheats,
     "paper": tables.paper,
-    "perturb": tables.control,
+    "perturb": tables.perturb,
     "predictors": predictors.fills,
+    "view": tables.warp,
 }
 """Functions that return the tables of a page of docs/ by the names of their marks."""
 CONTENTS = ("docs/index.md", "docs/tasks.md", "docs/api.md")

@@ -3,6 +3,7 @@
 import ast
 import importlib
 import inspect
+import json
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 import mutation_score
 import recall
 from hand import Hand
+from scipy.stats import binomtest
 from test_hands import HANDS
 
 from scengen import list_tasks, load_task
@@ -27,6 +29,7 @@ from scengen.attack.campaign import GRAMMAR
 from scengen.attack.evidence import TierRate
 from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
 from scengen.episode import PAPER, STRICT
+from scengen.evaluate.statistics import wilson
 from scengen.evidence import ledger
 from scengen.evidence.ledger import Evidence
 from scengen.measures import figures
@@ -34,6 +37,7 @@ from scengen.measures.figures import table
 from scengen.measures.policies import POLICIES
 from scengen.ood.analysis.leaks import SEARCH
 from scengen.ood.baseline import INCONCLUSIVE
+from scengen.perturb.perturbation import NONE as CLEAN
 from scengen.samplers.conditions import KINDS
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
@@ -51,6 +55,10 @@ CLAUSES = (
 """Titles of the table of clauses."""
 COSTS = ("task", "one [core s]", "10 thousand [core hours]", "1 million [core days]", "10 million [core days]")
 """Titles of the table of costs."""
+AGREEMENT = ("task", "witnesses", "goal reached", "same verdict", "ends within 1 cm", "largest distance, median [mm]")
+"""Titles of the table of witnesses in mujoco_warp."""
+WARP = Path(__file__).parents[1] / "records" / "warp"
+"""Folder of the results of `make warp`."""
 HOUR, DAY = 3600.0, 86_400.0
 
 
@@ -180,14 +188,53 @@ def drift() -> dict[str, str]:
     return {"drift": "\n".join(_drifted(names, [row for row in rows if row.has(mujoco=[*names])]) for names in sets)}
 
 
-def control() -> dict[str, str]:
+def warp() -> dict[str, str]:
+    """Witnesses in mujoco_warp: how often goal and end agree with C MuJoCo."""
+    lines = []
+    for path in sorted(WARP.glob("*.json")):
+        found = json.loads(path.read_text())
+        if found["version"] == load_task(found["task"]).version:
+            cells = (str(found[name]) for name in ("n", "goals", "verdicts", "near"))
+            lines.append([link(found["task"]), *cells, f"{1000 * found['median']:g}"])
+    return {"warp": table(AGREEMENT, lines)}
+
+
+def perturb() -> dict[str, str]:
+    """The tables of docs/perturb.md."""
+    return {"control": _control(), "disturbed": _disturbed()}
+
+
+def _disturbed() -> str:
+    """Scenarios that small policies solve under perturbations of their readings, with the paired difference."""
+    rows = [(task, row) for task in list_tasks() for row in ledger.newest("disturbed", task)]
+    asked = list(dict.fromkeys(condition for _, row in rows for condition in row.value))
+    lines = [
+        [link(task), f"{row.n}{ledger.mark(row)}", *(_solved(row.value, condition) for condition in asked)]
+        for task, row in rows
+    ]
+    return table(("task", "n", *(f"`{condition}`" if condition != CLEAN else "clean" for condition in asked)), lines)
+
+
+def _solved(value: Mapping[str, Any], condition: str) -> str:
+    """Percent solved with its 95 % interval; a star where the paired difference from the clean run is significant."""
+    if condition not in value:
+        return NONE
+    clean, own = (dict(map(tuple, value[each]["outcomes"])) for each in (CLEAN, condition))
+    worse, better = (sum(clean[k] == is_lost != own[k] for k in own) for is_lost in (True, False))
+    share = value[condition]["solved"] / len(own)
+    low, high = wilson(share, len(own))
+    is_clear = worse + better > 0 and binomtest(worse, worse + better).pvalue < 0.05
+    return f"{share:.0%} [{low:.0%}, {high:.0%}]{'*' if is_clear else ''}"
+
+
+def _control() -> str:
     """Conditions of control that each task bears: for each kind the scenarios certified at levels 1 to 5."""
     lines = []
     for task in list_tasks():
         row = next(iter(ledger.newest("control", task)), None)
         cells = [_borne(row.value[kind]) if row else ledger.not_measured(task) for kind in KINDS]
         lines.append([link(task), f"{row.n}{ledger.mark(row)}" if row else NONE, *cells])
-    return {"control": table(("task", "scenarios", *(f"`{kind}`" for kind in KINDS)), lines)}
+    return table(("task", "scenarios", *(f"`{kind}`" for kind in KINDS)), lines)
 
 
 def _borne(figures: Mapping[str, Any]) -> str:

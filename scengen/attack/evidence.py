@@ -49,7 +49,7 @@ passes with a probability of 13 %."""
 
 
 RESUMED = " from a state of the witness on"
-"""Remark about a filtered hit that `Hit.resumed` tells of."""
+"""Remark about a filtered hit that is `Hit.resumed`."""
 
 
 def spelled(raw: bool) -> str:
@@ -213,9 +213,12 @@ def scenario_of(hit: Hit, task: Task) -> Scenario:
     """The scenario of a hit, under its conditions.
 
     Raises:
-        ScengenError: the parameters, or the conditions, are not those of the task.
+        ScengenError: the parameters are not those of the task, or there are no such conditions.
     """
-    return task.scenario(hit.params, hit.conditions or TRAINING)
+    try:
+        return task.scenario(hit.params, hit.conditions or TRAINING)
+    except BadConfig as error:
+        raise BadConfig(f"{hit.name}: {error}; give a hit that scengen attack has stored") from None
 
 
 def replayed(hit: Hit, task: Task) -> Replayed:

@@ -9,13 +9,14 @@ certificate. Reset samples nothing: the seed selects one of the stored scenarios
 """
 
 import threading
+import time
 import warnings
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -105,6 +106,15 @@ class ObservationSettings:
             return
         for (params,) in rows.columns("params"):
             task.scenario(params).orientation.check_size(self.width, self.height)
+
+
+class Drawing(NamedTuple):
+    """Work that went into pictures."""
+
+    pictures: int = 0
+    """Number of pictures."""
+    seconds: float = 0.0
+    """Time that they took [s]."""
 
 
 class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -229,6 +239,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._instruction: str | None = None
         self.instruction_read = False
         """Whether `task_description` was read."""
+        self.drawing = Drawing()
+        """Work that went into pictures since the environment was made."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles open the pools again and continue from the same state with a separate simulation."""
@@ -285,7 +297,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self.steps_in(max(pool.manifest.task_node["horizon"] for pool in self._rows.pools))
 
     def steps_in(self, seconds: float) -> int:
-        """Number of steps in a time [s], the last one begun."""
+        """Number of steps that a time takes [s], rounded up."""
         return int(np.ceil(seconds / (Loop.PERIOD * self.action_repeat) - 1e-9))
 
     def check_observations(self, names: Sequence[str]) -> None:
@@ -516,10 +528,13 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._senses.reading(name, self.metadata["names"][name], self.world.time, reading)
 
     def _picture(self, camera: str) -> NDArray[np.uint8]:
+        start = time.perf_counter()
         if self._renderer is None:
             self._renderer = Camera(self.world, self.observed.width, self.observed.height)
         picture = self._scenario.orientation.apply(self._renderer.take(camera)).copy()
-        return self._senses.picture(camera, self.world.time, picture)
+        seen = self._senses.picture(camera, self.world.time, picture)
+        self.drawing = Drawing(self.drawing.pictures + 1, self.drawing.seconds + time.perf_counter() - start)
+        return seen
 
     def _info(self, reason: str, success: bool) -> dict[str, Any]:
         found = {"success": success, "is_success": success, "reason": reason, "lacks": self._episode.lacks}

@@ -104,6 +104,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         self._viewed = {name: s.view for name, s in first.streams.items() if s.view is not None}
         self._views = {name: [np.zeros(0)] * self.num_envs for name in self._viewed}
         size = (self.num_envs, first.observed.height, first.observed.width, 3)
+        self._draws = np.ones(self.num_envs, np.bool_)
         self._pictures = {name: np.zeros(size, np.uint8) for name in first.cameras}
         self._crew = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
@@ -134,11 +135,13 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         self._started = True
         return self._observed(), self._gathered(infos)
 
-    def step(self, actions: ArrayLike) -> Steps:
+    def step(self, actions: ArrayLike, draw: ArrayLike | None = None) -> Steps:
         """Take a step in every slot.
 
         Args:
             actions: shape (num_envs, size of an action).
+            draw: slots whose pictures are drawn, shape (num_envs,), so that unused pictures take no time. All others
+                are black, except those of a new episode and of cameras that are late. None for all slots.
 
         Raises:
             ValueError: the actions have another shape, or one is not finite. Nothing is simulated then.
@@ -146,6 +149,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         given = self._checked(actions)
         if not self._started:
             raise BadConfig("no scenario is running; call reset first")
+        self._draws[:] = True if draw is None else np.asarray(draw, np.bool_)
         over = self._terminated | self._truncated
         fresh = self._handed_out(over) if self._mode == AutoresetMode.NEXT_STEP else {}
         rewards = np.zeros(self.num_envs)
@@ -269,6 +273,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
             for slot in slots:
                 env = self.envs[slot]
                 env._load(rows[slot])
+                self._draws[slot] = True
                 for name, view in self._viewed.items():
                     self._views[name][slot] = view(env.world)
                 infos[slot] = {**env._info("", False), **(env._labels() if self._labels else {})}
@@ -309,7 +314,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         for read, readings in self._reads[slot]:
             readings[slot] = read(world)
         for name, camera in env.observed.cameras.items():
-            self._pictures[name][slot] = env._picture(camera)
+            self._pictures[name][slot] = env._picture(camera) if self._draws[slot] or env.drawn.delay else 0
 
     def _observed(self) -> dict[str, Reading]:
         """The observations after the last steps, as new arrays."""

@@ -1,9 +1,10 @@
 """Rollouts of a policy: as many at once as there are slots, one batch after the other."""
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -23,7 +24,7 @@ from ..samplers.keyed import unit
 from ..samplers.split import ID
 from ..sim.arm import ROBOT
 from ..sim.world import World
-from .arms import CLEAN, instruction, seen_by
+from .arms import ARMS, CLEAN, PICTURES, instruction, seen_by
 from .lines import picture_digest, state_digest
 from .policies import REPLAY, Policy, find_policy, identity, make_policy, policy_errors
 from .remote.policy import RemotePolicy
@@ -34,6 +35,25 @@ A = TypeVar("A")
 
 class BadPolicy(ScengenError):
     """A policy returned an invalid action."""
+
+
+class Spent(NamedTuple):
+    """Time of rollouts with pictures."""
+
+    seconds: float = 0.0
+    """Time of the rollouts, added up over threads and processes [s]."""
+    pictures: int = 0
+    """Number of pictures that were drawn."""
+    drawing: float = 0.0
+    """Part of the time that they took [s]."""
+
+    def plus(self, other: "Spent") -> "Spent":
+        """The sum of two."""
+        return Spent(self.seconds + other.seconds, self.pictures + other.pictures, self.drawing + other.drawing)
+
+    def __str__(self) -> str:
+        share = f"{self.drawing / self.seconds:.0%}" if self.seconds else "0%"
+        return f"drawing took {share} of the time: {self.pictures} pictures in {self.drawing:.1f} s"
 
 
 PHASES = ("before contact", "in contact", "after contact")
@@ -74,7 +94,8 @@ class PolicyPlayer:
         """Play rollouts of one task and condition, from reset to their ends, or until their policies crash.
 
         Returns:
-            The records, each with the actions that the controller received as `played` if episodes are kept.
+            The records, each with the actions that the controller received as `played` if episodes are kept, and the
+            first one with the `Spent` time of all if there are cameras.
 
         Raises:
             BadPolicy: a policy returned an invalid action.
@@ -85,8 +106,12 @@ class PolicyPlayer:
         rollouts = [_PlayedRollout(which, env, policy=policy) for which, env, policy in places]
         for rollout in rollouts:
             rollout.instruct(self.search)
+        start, before = time.perf_counter(), [env.drawing for env in envs.envs]
         self._play(envs, rollouts)
         self.strict = False
+        if envs.envs[0].cameras:
+            drawn = np.subtract([env.drawing for env in envs.envs], before).sum(axis=0).tolist()
+            rollouts[0].record["spent"] = Spent(envs.threads * (time.perf_counter() - start), int(drawn[0]), drawn[1])
         return [rollout.record for rollout in rollouts]
 
     def _play(self, envs: PoolVectorEnv, rollouts: "Sequence[_PlayedRollout]") -> None:
@@ -101,12 +126,15 @@ class PolicyPlayer:
             self._tried([rollout], f"its reset {rollout.where}", begin)
         actions = np.zeros((count, size), np.float32)
         while going := {slot: rollout for slot, rollout in enumerate(rollouts) if not rollout.record}:
-            views = [rollout.sees(_of_slot(seen, slot)) for slot, rollout in going.items()]
+            views = [rollout.sees(rollout.shown(_of_slot(seen, slot))) for slot, rollout in going.items()]
             chosen = self._actions([*going.values()], views)
             for (slot, rollout), action in zip(going.items(), chosen, strict=True):
                 if action is not None:
                     actions[slot] = self._checked(rollout, action, size)
-            seen, _, terminated, truncated, infos = envs.step(actions)
+            draw = np.zeros(count, np.bool_)
+            for slot, rollout in going.items():
+                draw[slot] = rollout.looks = self._looks(rollout)
+            seen, _, terminated, truncated, infos = envs.step(actions, draw)
             for slot, rollout in going.items():
                 if not rollout.record and (terminated[slot] or truncated[slot]):
                     rollout.end(bool(infos["success"][slot]), infos["reason"][slot], lacks=infos["lacks"][slot])
@@ -140,6 +168,13 @@ class PolicyPlayer:
             for rollout in rollouts:
                 rollout.end(False, "", crashed=str(error))
             return None
+
+    def _looks(self, rollout: "_PlayedRollout") -> bool:
+        """Whether pictures are drawn for the next act of a policy. One without `looks` uses them."""
+        looks = getattr(rollout.policy, "looks", None)
+        if rollout.record or rollout.blind or not rollout.env.cameras:
+            return False
+        return looks is None or bool(self._tried([rollout], f"its looks {rollout.where}", looks))
 
     def _checked(self, rollout: "_PlayedRollout", action: NDArray[np.float64], size: int) -> NDArray[np.float32]:
         try:
@@ -301,6 +336,18 @@ class _PlayedRollout(Rollout):
     """A rollout of a policy in a slot."""
 
     policy: Policy = field(kw_only=True)
+    looks: bool = True
+    """Whether the policy uses the pictures of the last observation."""
+
+    @property
+    def blind(self) -> bool:
+        """Whether all pictures are black, so that none has to be drawn."""
+        return self.which.arm in ARMS and ARMS[self.which.arm].needs == PICTURES
+
+    def shown(self, seen: Observation) -> Observation:
+        """An observation without pictures that the policy does not use."""
+        unused = () if self.looks or self.blind else self.env.cameras
+        return {name: value for name, value in seen.items() if name not in unused}
 
     def instruct(self, search: Sequence[str]) -> None:
         """Give the instruction of the arm."""

@@ -3,7 +3,8 @@
 A policy is any object with the two methods of `Policy` that `factory(env)` returns. The factory is named
 `module:factory` and called for every slot in every process and for every task. A policy may have a static method
 `act_all(policies, observations)` that returns the actions of several of them, in their order: a network computes those
-of all slots at once.
+of all slots at once. It may have a method `looks()` that says whether the next `act` uses pictures, such as at the
+end of a chunk of actions: pictures take most of the time, and if it returns false, the next observation has none.
 
 A factory may declare what its policies need, as attributes (of a class, class attributes): see `Needs`.
 """

@@ -5,7 +5,7 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
@@ -23,10 +23,10 @@ from ..work.fingerprint import fingerprint
 from ..work.log import Log
 from ..work.machine import cores
 from ..work.parallel import each
-from ..work.targets import refused, try_folder
+from ..work.targets import move_aside, try_folder
 from .arms import BENIGN, automatic_arms
 from .lines import CHAIN, COLUMNS, FORMAT, RUN, chained, renewed, run_sha256
-from .player import PolicyPlayer, policy_seed
+from .player import PolicyPlayer, Spent, policy_seed
 from .scenarios import Scenarios, chosen, not_playable
 from .settings import Condition, EvaluateSettings, RolloutId, T, completed
 
@@ -52,6 +52,8 @@ class Evaluation:
     """Hash at the end of the file of episodes, see `lines.chained`."""
     drawn: Mapping[str, str] = field(default_factory=dict)
     """Hashes of the pools that a search for a threshold has drawn, by folder."""
+    spent: Spent = field(default_factory=Spent)
+    """Time of the rollouts that were played now, if there are cameras."""
 
 
 def evaluate(
@@ -85,7 +87,7 @@ def evaluate(
         run.play(wanted(about, settings, arms := run.arms()))
         run.sort()
         pinned = {str(pool.folder): pool.sha256 for pool in fresh}
-        return Evaluation(run.lines(), run.earlier, lost, arms, pinned, run.chain)
+        return Evaluation(run.lines(), run.earlier, lost, arms, pinned, run.chain, spent=run.spent)
 
 
 def ready(settings: T) -> T:
@@ -127,7 +129,7 @@ def opened(
         task_versions = {a["task"]: a["task_version"] for a in about.values()}
         described = player.described({*task_versions})
         if settings.fresh:
-            _move_aside(path)
+            move_aside(path, path.with_name(RUN))
         whole = {**depends, "task_versions": task_versions, **described}
         with Log(path, whole, remedy, settings.folder / RUN) as log:
             yield Run(settings, about, log, player, keep, progress)
@@ -176,6 +178,8 @@ class Run(LineLog):
     """Called with the number of rollouts done, and their total."""
     earlier: int = 0
     """Number of episodes that an earlier run played."""
+    spent: Spent = field(default_factory=Spent)
+    """Time of the rollouts that this run played, if there are cameras."""
     wanted: set[RolloutId] = field(default_factory=set)
     """All rollouts of the run."""
 
@@ -190,6 +194,7 @@ class Run(LineLog):
         self.progress(done, len(some))
         self.player.strict = not self.log.records
         for count, record in enumerate(_played(self.player, todo), done + 1):
+            self.spent = self.spent.plus(record.pop("spent", Spent()))
             played = record.pop("played", None)
             if played is not None:
                 self.keep(id_of(record), played)
@@ -307,20 +312,3 @@ def _for_workers(player: PolicyPlayer) -> PolicyPlayer:
     fresh = [str(Path(folder).resolve()) for folder in settings.benign]
     changed = replace(settings, pool=folders, benign=fresh, client=client, workers=1)
     return PolicyPlayer(changed, player.search, player.strict, threads)
-
-
-def _move_aside(path: Path) -> None:
-    """Rename the file of episodes of earlier runs; nothing is deleted."""
-    if not path.exists():
-        return
-    free = next(k for k in itertools.count(1) if not _numbered(path, k).exists())
-    try:
-        path.rename(_numbered(path, free))
-        with suppress(FileNotFoundError):
-            path.with_name(RUN).rename(_numbered(path.with_name(RUN), free))
-    except OSError as error:
-        raise refused(path, error) from None
-
-
-def _numbered(path: Path, number: int) -> Path:
-    return path.with_name(f"{path.stem}-{number}{path.suffix}")

@@ -36,6 +36,7 @@ Kind = Literal[
     "drift",
     "perturb",
     "control",
+    "disturbed",
 ]
 """Kind of a measurement, and name of its folder in records/.
 
@@ -44,7 +45,7 @@ Kind = Literal[
 cheats of people; `leak`: hidden parameters in observations; `recall`: cheats that the adversary finds again;
 `mutation`: rules left out; `plan`: plans carried out; `prior`: answers that need no look; `drift`: verdicts under other
 versions of MuJoCo; `perturb`: proofs of perturbations; `control`: conditions of control
-under which the oracle succeeds.
+under which the oracle succeeds; `disturbed`: trained policies under perturbations of their readings.
 """
 KINDS: tuple[Kind, ...] = get_args(Kind)
 """All kinds."""

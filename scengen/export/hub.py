@@ -19,12 +19,12 @@ from jinja2 import Template
 
 from ..attack.evidence import TierRate, rates, spelled
 from ..certificate import CHECKS, Check, StoredCertificate
-from ..errors import BadConfig, cut
+from ..errors import BadConfig
 from ..pool import Pool
 from ..pool.manifest import MANIFEST
 from ..samplers.split import ID
 from ..work.printed import printable
-from ..work.targets import appearing, clear_unfinished, foreign, try_folder
+from ..work.targets import appearing, check_same, clear_unfinished, try_folder
 
 CARD_FILE = "README.md"
 """Name of the file that the Hub reads as the dataset card."""
@@ -214,12 +214,7 @@ def check_target(to: Path, pools: Sequence[Pool]) -> None:
         raise BadConfig(f"to = {to}; name a new folder for the data set")
     clear_unfinished(to)
     try_folder(to)
-    _check_same(to, {**_copies(pools), CARD_FILE: to / CARD_FILE} if (to / CARD_FILE).is_file() else {})
-
-
-def _check_same(to: Path, files: Mapping[str, bytes | Path]) -> None:
-    if other := foreign(to, files):
-        raise BadConfig(f"{to} is not empty: it holds {cut(other)}; delete it, or name another folder")
+    check_same(to, {**_copies(pools), CARD_FILE: to / CARD_FILE} if (to / CARD_FILE).is_file() else {})
 
 
 def _copies(pools: Sequence[Pool]) -> dict[str, Path]:
@@ -263,7 +258,7 @@ def publish(card: DatasetCard, to: Path) -> bool:
         BadConfig: the folder holds another data set, or cannot be written.
     """
     copies, text = _copies([published.pool for published in card.pools]), card.readme()
-    _check_same(to, {**copies, CARD_FILE: text.encode()})
+    check_same(to, {**copies, CARD_FILE: text.encode()})
     if (to / CARD_FILE).exists():
         return False
     with appearing(to, folder=True) as path:

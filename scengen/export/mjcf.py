@@ -63,13 +63,19 @@ def _files(row: PoolRow, target: Path, spec: mujoco.MjSpec | None) -> Iterator[t
     if spec is not None:
         _add_home(spec)
         root = ET.fromstring(spec.to_xml())
-        for mesh in root.iterfind("asset/mesh[@file]"):
-            source = panda.mesh_file(mesh.attrib["name"], mesh.attrib["file"])
-            name = f"{mesh.attrib['name']}{source.suffix}"
-            yield target.parent / "meshes" / name, source.read_bytes()
-            mesh.set("file", f"../meshes/{name}")
+        for name, content in meshes_of(root, "../meshes"):
+            yield target.parent / "meshes" / name, content
         yield target / "scene_with_robot.xml", _written(root)
     yield target / "scene.xml", alone
+
+
+def meshes_of(root: ET.Element, folder: str) -> Iterator[tuple[str, bytes]]:
+    """Files of the robot's meshes in a scene, and their contents. The scene then refers to them in `folder`."""
+    for mesh in root.iterfind("asset/mesh[@file]"):
+        source = panda.mesh_file(mesh.attrib["name"], mesh.attrib["file"])
+        name = f"{mesh.attrib['name']}{source.suffix}"
+        yield name, source.read_bytes()
+        mesh.set("file", f"{folder}/{name}")
 
 
 def _written(root: ET.Element) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from .adversary import Attacks, LeakSearches
 from .axes import Beliefs, Cards
 from .control import Controls
+from .disturbed import Disturbed
 from .measurement import Measurement
 from .perturbations import Proofs
 from .policies import Baselines, Trainings
@@ -26,6 +27,7 @@ MEASUREMENTS: Mapping[str, type[Measurement]] = {
         Trainings,
         Proofs,
         Controls,
+        Disturbed,
     )
 }
 """Measurements by the kind of their rows. Rows of other kinds come from tools of the repository."""

@@ -26,6 +26,7 @@ from ..pool import Pool
 from ..pool.manifest import MANIFEST
 from ..samplers.split import ID
 from ..samplers.task import Task
+from ..work.targets import appearing
 from .measurement import Job, Measurement, Result, Row
 
 POLICIES = (BC, MIP, KNN)
@@ -89,7 +90,7 @@ SEEN = ("robot0_", "force_torque", "observation.")
 
 
 @dataclass(frozen=True)
-class _OfPolicies(Measurement):
+class OfPolicies(Measurement):
     """A measurement that makes pools and demonstrations of a task, and trains and evaluates policies on them."""
 
     FOLDER = "generated/baselines"
@@ -121,10 +122,16 @@ class _OfPolicies(Measurement):
             self.finish("demos", f"task={task.name}", *numbers, *settings)
             self.finish("record", f"pool={folder}", f"to={to}", "cameras=none")
 
-    def play(self, policy: str, pools: Mapping[str, Path], to: Path) -> dict[str, list[dict[str, Any]]]:
-        """Evaluate a policy once on each scenario of some pools. Returns the episodes by split."""
+    def play(self, policy: str, pools: Mapping[str, Path], to: Path, *settings: str) -> dict[str, list[dict[str, Any]]]:
+        """Evaluate a policy once on each scenario of some pools, with further settings of `scengen evaluate`.
+
+        Returns:
+            The episodes by split.
+        """
         pooled = ",".join(map(str, pools.values()))
-        self.finish("evaluate", f"policy={policy}", f"pool={pooled}", f"seeds={SCENARIOS}", "rollouts=1", f"to={to}")
+        self.finish(
+            "evaluate", f"policy={policy}", f"pool={pooled}", f"seeds={SCENARIOS}", "rollouts=1", f"to={to}", *settings
+        )
         every = [json.loads(line) for line in (to / "episodes.jsonl").read_text().splitlines()]
         return {split: [one for one in every if one["pool"] == str(pool)] for split, pool in pools.items()}
 
@@ -136,7 +143,7 @@ def outcomes(episodes: Sequence[Mapping[str, Any]], pool: Path) -> list[list[Any
 
 
 @dataclass(frozen=True)
-class Baselines(_OfPolicies):
+class Baselines(OfPolicies):
     """Small policies in training and on all axes: trained ones, the nearest witness, and those that do not learn.
 
     A task takes about half an hour of processor time.
@@ -188,7 +195,7 @@ def _solved(name: str, rows: Iterable[Row]) -> str:
 
 
 @dataclass(frozen=True)
-class Trainings(_OfPolicies):
+class Trainings(OfPolicies):
     """Small policies that are trained on other demonstrations than the baselines.
 
     * `curves`: the first 25, 50 and 100 demonstrations; a baseline has all 200.
@@ -279,11 +286,9 @@ class Trainings(_OfPolicies):
 def _changed(source: Path, to: Path, change: Callable[[Path], None]) -> None:
     """Make a changed copy of a recording, unless it is there."""
     if not to.exists():
-        unfinished = to.with_suffix(".unfinished")
-        shutil.rmtree(unfinished, ignore_errors=True)
-        shutil.copytree(source, unfinished)
-        change(unfinished)
-        unfinished.rename(to)
+        with appearing(to, folder=True) as part:
+            shutil.copytree(source, part, dirs_exist_ok=True)
+            change(part)
 
 
 def choose(recording: Path, count: int) -> None:

@@ -36,7 +36,7 @@ def _revived(kind: "type[World]", model: mujoco.MjModel, scripted: int, state: N
     return world
 
 
-@dataclass
+@dataclass(repr=False)
 class World:
     """Simulation that maps names to numbers. It holds no task logic. `World.load` makes it, `step` drives it."""
 
@@ -75,6 +75,10 @@ class World:
         self.memory = Memory(self.model, self.data, lambda: this.check_event("writing to the memory"))
         self.filter, self.shown = Filter(len(self.arms)), np.zeros(MAX_MEANS)
         self.channel = Channel(self.loop.impairment, self.size)
+
+    def __repr__(self) -> str:
+        arms = f"{len(self.arms)} arms" if len(self.arms) > 1 else "1 arm"
+        return f"World({self.model.nbody} bodies, {arms}, time {self.time:.2f} s)"
 
     @classmethod
     def load(cls, scene_xml: str, embodiment: str = JAW, look: Look | None = None, substeps: int | None = None) -> Self:

@@ -19,11 +19,11 @@ from ..sim import scene_text
 from ..sim.embodiment import JAW, action_size
 from ..sim.world import World
 from .impaired import held, impaired, posed
-from .rollout import AT_REST, Jitter, Rollout, go_on, replay, run, try_shortcut
+from .rollout import AT_REST, Jitter, Rollout, go_on, replay, run, still_moving, try_shortcut
 from .settings import QUICK, CertifySettings, Robust, lower_bound
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Certified:
     """A certificate with the scene and the witness that it is about. The scene is empty if it was never built."""
 
@@ -32,6 +32,11 @@ class Certified:
     witness: Actions
     digest: str
     """Hash of the physics state at the end of the witness."""
+
+    def __repr__(self) -> str:
+        made = [check.passed for check in self.certificate.checks if check.passed is not None]
+        checks = f"{sum(made)} of {len(made)} checks passed"
+        return f"Certified({self.certificate.verdict}: {checks}, witness of {len(self.witness)} actions)"
 
     def _repr_html_(self) -> str:
         """Its checks, in a notebook."""
@@ -262,7 +267,8 @@ class Trial:
                     return {}, numbers, f"{name!r} reaches the goal ({how})"
                 if tried.outcome == "unstable" or (shortcut.to_rest and tried.reason != AT_REST):
                     seen = "reaches the goal" if tried.lacks else "was not seen to its end"
-                    return {}, numbers, f"{name!r} {seen} ({how}): {tried.reason}"
+                    left = "" if tried.lacks else f"; still moving: {', '.join(still_moving(self.world)) or 'nothing'}"
+                    return {}, numbers, f"{name!r} {seen} ({how}): {tried.reason}{left}"
         return {}, numbers, ""
 
     def _robust(self) -> "Finding":

@@ -17,6 +17,7 @@ from ..episode import STRICT, Actions, Episode, Outcome, Rules
 from ..errors import GaveUp
 from ..samplers.keyed import normals, spread
 from ..scenario import Action, Planner, Scenario, Shortcut
+from ..sim.arm import ROBOT
 from ..sim.world import World
 from .settings import Robust
 
@@ -33,7 +34,7 @@ OUT_OF_REACH = "no goal can count any more, it lacks"
 """Beginning of the reason of an episode that ended because a mean was missed. The missed means follow."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Rollout:
     """Result of a rollout."""
 
@@ -57,6 +58,10 @@ class Rollout:
     @property
     def solved(self) -> bool:
         return self.outcome == "success"
+
+    def __repr__(self) -> str:
+        why = f": {self.reason}" if self.reason else ""
+        return f"Rollout({self.outcome}{why}, {self.seconds:.2f} s, {len(self.actions)} actions)"
 
     def _repr_html_(self) -> str:
         """Its result, in a notebook."""
@@ -256,6 +261,16 @@ class _Recorded:
 
     def stop(self) -> None:
         """Called when the goal has been reached; a recording goes on."""
+
+
+def still_moving(world: World) -> list[str]:
+    """Bodies that move faster now than `REST_TOLERANCE` allows a body at rest; `ROBOT` stands for the robot's."""
+    found = dict[str, None]()
+    for dof, speed in enumerate(np.abs(world.data.qvel)):
+        body = int(world.model.dof_bodyid[dof])
+        if speed * REST_TIME >= REST_TOLERANCE:
+            found[ROBOT if body in world.own else world.model.body(body).name] = None
+    return list(found)
 
 
 class Stillness:

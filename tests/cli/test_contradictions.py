@@ -4,11 +4,10 @@ import pytest
 
 from scengen import cli
 from scengen.errors import BadConfig
-from scengen.validate.certify import lower_bound
-from scengen.validate.settings import CertifySettings, Robust
+from scengen.validate.settings import CertifySettings, Robust, lower_bound
 
 DOMINO = "task=domino_single"
-REFERENCE = "pool=generated/reference"
+REFERENCE = "pool=generated/reference/domino_single-id"
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ COMMANDS = {
     "record lerobot with cameras": ("record to={to} n=1 width=160 height=120 cameras=[rgb_exo_right_cam]", 20),
     "export": ("export to={to}", 30),
     "export without robot": ("export to={to} robot=false", 2),
+    "export batch": ("export to={to} format=batch layout=1", 5),
     "export hub": ("export hub to={to}", 20),
     "report": ("report to={to}.html", 20),
     "subset": ("subset to={to} n=2", 10),

@@ -83,6 +83,7 @@ KINDS = {
     ),
     "attack": Kind(("attack", "task=domino_single", "n=3", "budget=150"), "to", ("attack.jsonl",), workers=True),
     "hub": Kind(("export", "hub", "pool={pool}"), "to", ("README.md", "*/*"), workers=True),
+    "batch": Kind(("export", "pool={pool}", "format=batch", "layout=1"), "to", ("*.*", "meshes/*")),
     "subset": Kind(("subset", "pool={pool}", "n=3"), "to", ("manifest.json", "*.parquet")),
 }
 STUDIO = "studio"

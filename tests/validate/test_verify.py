@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from helpers import REFERENCE, of_stored_pools
@@ -628,6 +629,8 @@ def test_junit_tells_every_scenario_and_survives_any_text(mine):
     suite = ET.fromstring(junit({"a\x07b": found}).encode()).find("testsuite")
     assert suite.attrib["tests"] == "7" and suite.attrib["failures"] == "1"
     assert len(suite.findall("testcase")) == 7
+    told = {each.attrib["name"]: each.attrib["value"] for each in suite.findall("properties/property")}
+    assert told["level"] == found.level and told["settings"] == found.settings and told["mujoco"] == mujoco.__version__
 
 
 def test_canonical_numbers_survive_the_way_through_a_pool():

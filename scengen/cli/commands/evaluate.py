@@ -140,4 +140,6 @@ def _report(result: PolicyResult) -> bool:
     if found.earlier:
         what = "the pools, the settings and the policy are the same; fresh=true repeats them"
         say(f"{found.earlier} of {len(found.episodes)} episodes are from an earlier run: {what}")
+    if found.spent.pictures:
+        say(str(found.spent))
     return bool(found.lost or crashed)

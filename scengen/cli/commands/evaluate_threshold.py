@@ -126,4 +126,6 @@ def _report(result: ThresholdResult, pools: LevelPools) -> bool:
         )
     if found.earlier:
         say(f"{found.earlier} of {len(found.episodes)} episodes are from an earlier run; fresh=true repeats them")
+    if found.spent.pictures:
+        say(str(found.spent))
     return bool(found.lost or crashed)

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -74,6 +75,12 @@ class RemotePolicy:
         elif asking:
             asking[0]._ask()  # not in a thread: Ctrl-C ends it
         return [policy._plan.popleft() for policy in policies]
+
+    def looks(self) -> bool:
+        """Whether a request will hold the next observation: that of the next act, or a later one that looks back."""
+        wait = len(self._plan)
+        offsets = {0, *chain(*self._past.values())}
+        return any(-past >= wait and (-past - wait) % self.client.execute == 0 for past in offsets)
 
     def close(self) -> None:
         """Close the connection."""

@@ -115,7 +115,7 @@ def find(
             progress(played, settings.budget)
         progress(played, played)
         run.sort()
-        return Evaluation(run.lines(), run.earlier, lost, (), {}, run.chain)
+        return Evaluation(run.lines(), run.earlier, lost, (), {}, run.chain, spent=run.spent)
 
 
 def _within_reach(settings: ThresholdSettings, pools: LevelPools) -> Scenarios:
