@@ -406,7 +406,7 @@ class World:
 
     @functools.cached_property
     def _others(self) -> dict[int, str]:
-        """Names of the bodies that `touching_bodies` tells, by row of the contact tables."""
+        """Names of the bodies that `touching_bodies` returns, by row of the contact tables."""
         scene = {row: name for name, row in self._bodies.items() if row not in self.own}
         return scene | {self._labels[ROBOT]: ROBOT}
 

@@ -200,7 +200,7 @@ def try_shortcut(
     """Play a tempting plan as a certificate does: until the time limit, or longer if it is simulated to rest.
 
     Args:
-        until_decided: as for `run`; a plan that is simulated to rest is played to its end all the same.
+        until_decided: as for `run`; a plan that is simulated to rest is always played to its end.
     """
     patience = SHORTCUT_TIME_LIMITS if shortcut.to_rest else 1.0
     decided = until_decided and not shortcut.to_rest
