@@ -25,7 +25,7 @@ def conditions() -> list[str]:
 
 @dataclass(frozen=True)
 class Disturbed(OfPolicies):
-    """The baseline `bc` in training under perturbations of the readings, beside the clean run on the same scenarios.
+    """The baseline `bc` in training under perturbations of the readings, and the clean run on the same scenarios.
 
     It is trained on 200 demonstrations that are apart from these scenarios.
     """
