@@ -9,7 +9,9 @@ import scengen.envs.gym  # noqa: F401  (registers the tasks)
 STEPS = 200
 
 envs = gymnasium.make_vec("scengen/domino_single-v2", num_envs=16, observations=["object-state"])
-observations, infos = envs.reset(seed=0, options={"labels": True})  # those that come with scengen, in turn; or pool=FOLDER
+observations, infos = envs.reset(
+    seed=0, options={"labels": True}
+)  # those that come with scengen, in turn; or pool=FOLDER
 print(f"scenarios {', '.join(infos['scenario'][:6])} and so on")
 print(f"object-state {observations['object-state'].shape}, actions {envs.action_space.shape}")
 

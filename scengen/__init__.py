@@ -25,6 +25,7 @@ if sys.platform == "linux" and not {"MUJOCO_GL", "DISPLAY"} & os.environ.keys():
 if TYPE_CHECKING:
     from .certificate import Certificate
     from .compose import load_task
+    from .envs.inline import picture
     from .envs.pools import reference_pool
     from .params import param
     from .pool import Pool
@@ -47,6 +48,7 @@ __all__ = [
     "list_tasks",
     "load_task",
     "param",
+    "picture",
     "reference_pool",
     "replay",
     "run",
@@ -64,6 +66,7 @@ _HOME = {
     "list_tasks": ("samplers.task_files", "tasks"),
     "load_task": ("compose", "load_task"),
     "param": ("params", "param"),
+    "picture": ("envs.inline", "picture"),
     "reference_pool": ("envs.pools", "reference_pool"),
     "replay": ("validate.rollout", "replay"),
     "run": ("validate.rollout", "run"),

@@ -7,6 +7,7 @@ Tasks are composed and loaded here, too. Each of Hydra's errors becomes one line
 import itertools
 import logging
 import math
+import os
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +21,7 @@ import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override
+from hydra.core.override_parser.types import Override, ValueType
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -29,6 +30,7 @@ from .errors import SHOWN_LENGTH, BadConfig, UnknownName, cut
 from .samplers.task import Task, load
 from .samplers.task_files import (
     ORIGINS,
+    SEARCH_PATH,
     category,
     command_file,
     conf_dir,
@@ -84,14 +86,22 @@ def certify_levels(task: Task) -> dict[str, CertifySettings]:
     return {name: typed("certify", CertifySettings, certify_node({}, task, name)) for name in names}
 
 
-def certify_node(node: Mapping[str, Any], task: Task, level: str) -> dict[str, Any]:
+def certify_node(
+    node: Mapping[str, Any], task: Task, level: str, verb: str = "", words: Sequence[str] = ()
+) -> dict[str, Any]:
     """Settings of certificates as plain data: the file of the level, then those of the task, then the command line.
 
     Args:
         node: the composed settings, in which those of the task are not merged yet.
-        level: name of a file in conf/certify.
+        level: name of a file in conf/certify, or in a folder certify/ of the search path.
+        verb: the command, for a level of the search path.
+        words: its command line.
     """
-    base: dict[str, Any] = OmegaConf.to_container(OmegaConf.load(conf_dir() / "certify" / f"{level}.yaml"))  # type: ignore[assignment]
+    base: dict[str, Any]
+    if (file := conf_dir() / "certify" / f"{level}.yaml").is_file():
+        base = OmegaConf.to_container(OmegaConf.load(file))  # type: ignore[assignment]
+    else:
+        base = composed(verb, [word for word in words if not re.match(r"[+~]*certify\.", word)])[0]["certify"]
     overrides = OmegaConf.create(_difference(node, base))
     return OmegaConf.to_container(OmegaConf.merge(base, OmegaConf.create(dict(task.certify)), overrides))  # type: ignore[return-value]
 
@@ -121,7 +131,7 @@ def composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[
     """
     with initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
         try:
-            prepared = [_with_list(text) for text in overrides]
+            prepared = _all_prepared(overrides)
             for text in prepared:
                 _check_override(verb, text)
             prepared = _with_packages(prepared) if groups(verb) else prepared
@@ -180,10 +190,27 @@ def as_yaml(verb: str, overrides: Sequence[str]) -> str:
     """
     plain, choices = composed(verb, overrides)
     if {"certify", "task"} <= choices.keys():
-        plain["certify"] = certify_node(plain["certify"], load(choices["task"], plain["task"]), choices["certify"])
+        plain["certify"] = certify_node(
+            plain["certify"], load(choices["task"], plain["task"]), choices["certify"], verb, overrides
+        )
     flows = {key: None if isinstance(value, dict) else False for key, value in plain.items()}  # None: leaves in a line
     style = {"sort_keys": False, "allow_unicode": True, "width": 120}
     return "".join(yaml.safe_dump({key: plain[key]}, default_flow_style=flow, **style) for key, flow in flows.items())
+
+
+def hydra_yaml(verb: str, overrides: Sequence[str]) -> str:
+    """Hydra's own configuration of a command as YAML: `--cfg hydra`.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    composed(verb, overrides)
+    with initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
+        prepared = _all_prepared(overrides)
+        prepared = _with_packages(prepared) if groups(verb) else prepared
+        node = compose(config_name(verb), overrides=prepared, return_hydra_config=True)
+        OmegaConf.set_struct(node, False)
+        return OmegaConf.to_yaml(OmegaConf.create({"hydra": OmegaConf.to_container(node.hydra, resolve=False)}))
 
 
 def print_origin(verb: str, overrides: Sequence[str], topic: str) -> None:
@@ -192,11 +219,15 @@ def print_origin(verb: str, overrides: Sequence[str], topic: str) -> None:
     Raises:
         ScengenError: one line that says what is wrong.
     """
+    if not topic:
+        for each in ORIGINS[:-1]:  # the last one repeats the others, as Hydra's does
+            print_origin(verb, overrides, each)
+        return
     if topic not in ORIGINS:
         raise UnknownName("information of --info", topic, ORIGINS)
     composed(verb, overrides)
     with _logging_restored(), initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
-        prepared = [_with_list(text) for text in overrides]
+        prepared = _all_prepared(overrides)
         prepared = _with_packages(prepared) if groups(verb) else prepared
         GlobalHydra.instance().hydra.show_info(topic, config_name(verb), prepared)  # type: ignore[union-attr]
 
@@ -219,25 +250,77 @@ MAX_DIGITS = 4300
 """Number of digits of the longest number that Python reads."""
 MAX_DEPTH = 20
 """Largest nesting of lists and groups in an override: more than any file of conf/ needs."""
-LISTS = ("pool", "cameras", "mujoco", "apart", "data", "styles", "splits")
+LISTS = ("pool", "policy", "cameras", "mujoco", "apart", "data", "styles", "splits")
 """Settings for which several values are a list and not a sweep. `keep` is always a list."""
+PATHS = (
+    *("pool", "apart", "data", "to", "film", "json", "junit", "hit", "hits", "results", "records", "ycb", "mesh"),
+    *("policy", "client", "edition", "model", "device", "url", "title"),
+)
+"""Settings with paths, addresses or words of people, which are taken as they are: no letter in them means anything to
+Hydra, except in a value that is quoted or a list in brackets."""
+HYDRAS = re.compile(r"""'.*'|".*"|\[.*\]|\w+\(.*\)|null""", re.S)
+"""Values that may be Hydra's: quoted ones, lists, functions such as `choice(a,b)`, and null."""
 
 
-def _with_list(text: str) -> str:
-    """An override with brackets around the values of a setting that is a list, such as `keep=refuted,unknown`.
+def _all_prepared(overrides: Sequence[str]) -> list[str]:
+    """The overrides of a command line as Hydra reads them."""
+    task = next((text.removeprefix("task=") for text in overrides if text.startswith("task=")), "${task}")
+    return [_prepared(text, task) for text in overrides]
+
+
+def _prepared(text: str, task: str = "${task}") -> str:
+    """An override as Hydra reads it: paths and ids quoted, and brackets around the values of a setting that is a list.
 
     The value of `id` is quoted: `12e4` is the beginning of an id and not a number.
+
+    Args:
+        task: text for `${task}` in a path.
     """
-    key, _, value = text.partition("=")
+    if text.startswith(SEARCH_PATH):
+        return search_path([text])[0]
+    key, given, value = text.partition("=")
     if key == "id" and value != "null" and re.fullmatch(r"[\w@+/]+", value, re.ASCII):
         return f"id='{value}'"
+    if key in PATHS and given:
+        value = value.replace("${task}", task)
+        named = [value] if key not in LISTS or _is_hydras(value) else _split(value)
+        whole = [path if _is_hydras(path) else _quote(_at_home(path)) for path in named]
+        return f"{key}={whole[0]}" if len(whole) == 1 else f"{key}=[{','.join(whole)}]"
     is_list = key == "keep" or (key in LISTS and "," in value and value[:1] not in ("'", '"'))
     return f"{key}=[{value}]" if is_list and not value.startswith("[") else text
 
 
+def _is_hydras(value: str) -> bool:
+    """Whether a value of one of `PATHS` is meant for Hydra: no file has this name, and Hydra can read it."""
+    if not HYDRAS.fullmatch(value) or os.path.exists(value) or (override := _parsed(f"key={value}")) is None:
+        return False
+    return not override.is_sweep_override() or override.value_type is not ValueType.SIMPLE_CHOICE_SWEEP
+
+
+def _split(value: str) -> list[str]:
+    """Paths of a list with commas. The longest part that exists is one of them: a comma may belong to a name."""
+    parts, found = value.split(","), list[str]()
+    while parts:
+        longest = next((n for n in range(len(parts), 0, -1) if os.path.exists(",".join(parts[:n]))), 1)
+        found.append(",".join(parts[:longest]))
+        parts = parts[longest:]
+    return found
+
+
+def _at_home(path: str) -> str:
+    """A path with the home folder for `~`, which shells leave after an `=`."""
+    return os.path.expanduser(path) if path.startswith("~") and not os.path.exists(path) else path
+
+
+def _quote(value: str) -> str:
+    """A text in quotes as Hydra reads them: backslashes before a quote, or at the end, are doubled."""
+    doubled = re.sub(r"(\\*)('|$)", lambda found: 2 * found[1] + ("\\'" if found[2] else ""), value)
+    return f"'{doubled}'"
+
+
 def _with_packages(overrides: Sequence[str]) -> list[str]:
     """Overrides that make Hydra search installed packages, too, after the folders that the overrides name."""
-    named, others = search_path(overrides), [text for text in overrides if not text.startswith("hydra.searchpath=")]
+    named, others = search_path(overrides), [text for text in overrides if not text.startswith(SEARCH_PATH)]
     if not packages():
         return [*named, *others]
     values = [override.value() for text in named if (override := _parsed(text))]
@@ -258,14 +341,14 @@ def _check_override(verb: str, text: str) -> None:
     if override is None and re.search(rf"\d{{{MAX_DIGITS + 1}}}", text):
         raise BadConfig(f"{quoted} has a number of more than {MAX_DIGITS} digits; give a shorter one")
     if override is None or not override.key_or_group:
-        raise BadConfig(f"{quoted} is not an override; expected key=value{_quoted(text)}")
+        raise BadConfig(f"{quoted} is not an override; expected key=value{_remedy(verb, text)}")
     key = override.key_or_group
     if override.package is not None:
         raise BadConfig(f"{quoted}: a setting has no package after @; see scengen {verb} --help")
     if override.is_sweep_override():
         raise BadConfig(f"{quoted} has multiple values; give one, or quote a value with commas twice: \"{key}='...'\"")
     if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
-        raise BadConfig(f"{quoted}: expected hydra.searchpath=[file:///folder], the only setting of Hydra for scengen")
+        raise BadConfig(f"{quoted}: {_instead_of(key)}; hydra.searchpath is the only setting of Hydra for scengen")
     if override.is_delete() and (name := re.split("[./]", key)[0]) not in (known := _known(verb)):
         raise UnknownName(f"setting of {verb}", name, known)
     if override.is_delete() and not key.startswith("task."):
@@ -288,19 +371,34 @@ def _check_override(verb: str, text: str) -> None:
         raise BadConfig(f"{quoted}: leave it out, or name a file of conf/{key}")
 
 
+def _instead_of(key: str) -> str:
+    """What to give instead of a setting of Hydra."""
+    said = {
+        "launcher": "workers=N uses the cores of this machine, executor=ray those of a cluster",
+        "sweeper": "several values make a sweep, as in seed=1,2",
+        "sweep": "several values make a sweep, as in seed=1,2, and pool= or to= names its folder",
+        "run": "pool= or to= names the folder of the results",
+    }
+    return said.get(re.split("[./]", key)[1] if re.search("[./]", key) else "", "leave it out")
+
+
 def _known(verb: str) -> list[str]:
     """Names of the settings of a command, and of the groups from which it takes files."""
     own = re.findall(r"^(\w+):", command_file(verb).read_text(), re.M)
     return [*groups(verb), *(name for name in own if name != "defaults")]
 
 
-def _quoted(text: str) -> str:
-    """The remedy for a value with letters that mean something to Hydra, as a shell takes it."""
+def _remedy(verb: str, text: str) -> str:
+    """The remedy for an override that Hydra cannot read: a name for a bare word, or quotes as a shell takes them."""
     key, given, value = text.partition("=")
     fixed = f'{key}="{value}"'
     if given and len(text) < SHOWN_LENGTH and re.fullmatch(r"[\w.+]+", key) and _parsed(fixed):
         return f"; quote the value twice: {shlex.quote(fixed)}"
-    return ", quoted if the value holds spaces or commas"
+    if not given and "task" in groups(verb) and text in tasks():
+        return f"; did you mean task={text}?"
+    if not given and (named := [key for key in ("pool", "data") if key in _known(verb)]) and os.path.exists(text):
+        return f"; did you mean {named[0]}={cut(text)}?"
+    return f"; see scengen {verb} --help"
 
 
 def _files_of(group: str) -> str:
@@ -357,7 +455,7 @@ def combinations(verb: str, overrides: Sequence[str]) -> list[Combination]:
     with initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
         parser = OverridesParser.create(config_loader=GlobalHydra.instance().config_loader())
         try:
-            choices = [_swept_values(parser, _with_list(text)) for text in overrides]
+            choices = [_swept_values(parser, _prepared(text)) for text in overrides]
         except HydraException as error:
             raise BadConfig(f"{_one_line(str(error))}; see scengen {verb} --help") from None
     if (count := math.prod(len(values) for _, values in choices)) > MAX_COMBINATIONS:
@@ -406,10 +504,21 @@ def _explained(verb: str, overrides: Sequence[str], error: Exception) -> BadConf
         return BadConfig(f"{verb} needs {match[1]}=NAME; known: {known}")
     if match := re.search(r"Could not override '([^']+)'", text):
         return _unknown_key(verb, overrides, match[1]) or BadConfig(f"{_one_line(text)}; see scengen {verb} --help")
+    if match := re.match(r"Error merging override (.*)", text):
+        return BadConfig(f"{cut(match[1])} is not a value of this setting; {_forms(match[1])}")
     if isinstance(error, OmegaConfBaseException):
         key = f"{error.full_key}: " if error.full_key else ""
         return BadConfig(f"{key}{_one_line(text.splitlines()[0])}; give the value itself")
     return BadConfig(f"{_one_line(text)}; see scengen {verb} --help")
+
+
+def _forms(override: str) -> str:
+    """What a setting accepts that cannot be merged with the value given."""
+    if re.match(r"\+*task\.(id|axes)\.", override):
+        return (
+            "give a number, [uniform, low, high], [loguniform, low, high], [integer, low, high] or [choice, a, b, ...]"
+        )
+    return "give one value of the kind of its default"
 
 
 def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName | BadConfig | None:
@@ -431,6 +540,8 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
             if seen == ["executor"] and not known:
                 return BadConfig(f"{path} is a setting of executor=ray; give that, too")
             unknown = UnknownName(f"key in {'.'.join(seen)}" if seen else f"setting of {verb}", part, known)
+            if seen == ["task", "axes"] and path.count(".") == 2:
+                return BadConfig(f"{unknown}; +{path}={{why: ..., replace: {{...}}}} adds an axis")
             if seen[:2] == ["task", "id"]:  # a parameter that the task file does not list is nominal: it can be added
                 return BadConfig(f"{unknown}; +{path}=... adds one")
             return unknown

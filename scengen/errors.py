@@ -1,7 +1,16 @@
-"""Errors that a user can act on. Each message says what was given, what is accepted, and the nearest known name."""
+"""Errors that a user can act on. Each message says what was given, what is accepted, and the nearest known name.
+
+`place_of` finds out whose code an error comes from.
+"""
 
 import difflib
+import sysconfig
+import traceback
 from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from types import FrameType
 
 
 class ScengenError(Exception):
@@ -84,3 +93,57 @@ def nearest(name: str, known: Iterable[str]) -> str:
     """The clause ` (did you mean 'x'?)`, or an empty text if no known name is close."""
     close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6) if len(name) <= SHOWN_LENGTH else []
     return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+PLACE = "_scengen_place"
+"""Attribute of an error that holds `place_of` in the process where it was raised: tracebacks stay there."""
+
+
+def with_place(error: Exception) -> Exception:
+    """An error that can be sent to another process without losing the place from which it comes."""
+    setattr(error, PLACE, place_of(error))
+    return error
+
+
+def place_of(error: BaseException) -> str:
+    """The last place in code that is not scengen's through which an error came, such as `task.py, line 3, in success`.
+
+    Returns:
+        The place; empty if only scengen, its dependencies and Python were involved.
+    """
+    if (place := getattr(error, PLACE, None)) is not None:
+        return place
+    if isinstance(error, SyntaxError) and error.filename and _is_foreign(error.filename, ""):
+        return f"{_shown(error.filename)}, line {error.lineno}"
+    for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
+        if _is_foreign(frame.f_code.co_filename, _package(frame)):
+            return f"{_shown(frame.f_code.co_filename)}, line {line}, in {frame.f_code.co_name}"
+    return ""
+
+
+def _package(frame: FrameType) -> str:
+    return str(frame.f_globals.get("__name__", "")).partition(".")[0]
+
+
+@cache
+def _is_foreign(file: str, package: str) -> bool:
+    """Whether a file is neither scengen's nor that of Python or of an installed package that does not build on it."""
+    path, installed = Path(file), sysconfig.get_paths()
+    if not path.is_file() or path.is_relative_to(Path(__file__).parent):
+        return False
+    if path.is_relative_to(installed["purelib"]) or path.is_relative_to(installed["platlib"]):
+        return _builds_on_scengen(package)
+    return not (path.is_relative_to(installed["stdlib"]) or path.is_relative_to(installed["platstdlib"]))
+
+
+def _builds_on_scengen(package: str) -> bool:
+    """Whether the distribution of a package requires scengen, as one with tasks does."""
+    names = metadata.packages_distributions().get(package, [])
+    required = [line for name in names for line in metadata.requires(name) or []]
+    return any(line.split(";")[0].strip().startswith("scengen") for line in required)
+
+
+def _shown(file: str) -> str:
+    """A file relative to the working directory if it is in it."""
+    path = Path(file)
+    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)

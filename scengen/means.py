@@ -78,18 +78,23 @@ class Watch:
             raise ValueError(f"a task has at most {MAX_MEANS} means, not {len(means)}")
         self.means, self.world = means, world
         self._numbers = {name: number for number, name in enumerate(means)}
+        self._order = [(number, mean, self._numbers.get(mean.after)) for number, mean in enumerate(means.values())]
 
     def update(self) -> None:
         """Judge the past control period."""
-        shown = self.world.shown
-        for name, mean in self.means.items():
-            number = self._numbers[name]
-            if shown[number] == OPEN and (not mean.after or shown[self._numbers[mean.after]] == SHOWN):
-                shown[number] = mean.found(self.world)
+        world, shown = self.world, self.world.shown
+        for number, mean, before in self._order:
+            if shown.item(number) == OPEN and (before is None or shown.item(before) == SHOWN):
+                shown[number] = mean.found(world)
 
     def found(self) -> dict[str, float]:
         """What is found out about each mean so far: `OPEN`, `SHOWN` or `MISSED`."""
         return {name: float(self.world.shown[number]) for name, number in self._numbers.items()}
+
+    @property
+    def missed(self) -> str:
+        """Names of the means that were missed, joined by semicolons; empty if none was. A missed mean stays missed."""
+        return "; ".join(name for name, number in self._numbers.items() if self.world.shown[number] == MISSED)
 
     def lacking(self) -> str:
         """Names of the means that a success now lacks, joined by semicolons; empty for a success by the means."""

@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from .assets.keyboard import LETTERS
 from .assets.prop import TABLE_TOP
 from .control.loop import Loop
@@ -58,7 +56,7 @@ def rests_on(world: World, body: str, support: str) -> bool:
 def inside(world: World, body: str, container: str, low: Vec3, high: Vec3) -> bool:
     """Whether a body's origin lies between two corners given in the container's axes [m]."""
     place = world.rot(container).T @ (world.pos(body) - world.pos(container))
-    return bool(np.all(place >= low) and np.all(place <= high))
+    return all(least <= at <= most for least, at, most in zip(low, place.tolist(), high, strict=True))
 
 
 def seated(world: World, body: str, container: str, middle: Vec3, off: float, high: float) -> bool:
@@ -75,7 +73,8 @@ def seated(world: World, body: str, container: str, middle: Vec3, off: float, hi
 
 def over(world: World, body: str, spot: Vec3, half: float) -> bool:
     """Whether a body's centre of mass is over a square along x and y, given by its middle and half its side [m]."""
-    return bool(np.abs(world.com(body) - spot)[:2].max() <= half)
+    x, y, _ = (world.com(body) - spot).tolist()
+    return max(abs(x), abs(y)) <= half
 
 
 def count_time(world: World, name: str, holds: bool) -> None:

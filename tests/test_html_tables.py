@@ -1,7 +1,9 @@
 """Tables of notebooks: what they show is escaped, and long ones are abridged."""
 
+import importlib.metadata
 import re
 import shutil
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +13,8 @@ from helpers import REFERENCE, pictures_are_possible
 import scengen
 from scengen import html_tables
 from scengen.certificate import Certificate, Check
+from scengen.errors import BadConfig
+from scengen.look.looks import ROOM
 from scengen.pictures import film
 from scengen.validate.certify import Certified
 from scengen.validate.rollout import Rollout
@@ -35,6 +39,72 @@ def test_a_draw_shows_what_the_axis_changed_first(draw):
     first, *others = re.findall(r"<tr>(?:<td[^>]*>([^<]*)</td>){4}</tr>", page)
     assert first == "yes" and set(others) == {"no"} and "gap_ratio" in page and is_harmless(page)
     assert f"training twin {draw.id_twin}" in page and draw.scenario.id in page
+
+
+def test_the_version_is_that_of_the_package():
+    assert scengen.__version__ == importlib.metadata.version("scengen") and "__version__" in dir(scengen)
+
+
+def test_objects_are_one_short_line(draw):
+    pool, task = scengen.Pool.open(REFERENCE), scengen.load_task("domino_single")
+    row = pool.row("8ed4")
+    checks = tuple(Check(name, passed, "", {}, {}) for name, passed in (("feasible", True), ("solved", None)))
+    certified = Certified(Certificate("quick", checks), "", ACTIONS, "")
+    for each, expected in (
+        (pool, f"Pool({str(REFERENCE)!r}: {len(pool)} of domino_single/id)"),
+        (row, "PoolRow(domino_single/id@0/8ed4a4577fe0)"),
+        (task, f"Task(domino_single version {task.version}: {len(task.axes)} axes)"),
+        (draw, f"Draw(domino_single/wide_gaps@7/{draw.scenario.id}: gap_ratio = 1.342)"),
+        (certified, "Certified(unknown: 1 of 1 checks passed, witness of 3 actions)"),
+        (Rollout("failure", "why", 1.5, ACTIONS, ""), "Rollout(failure: why, 1.50 s, 3 actions)"),
+        (scengen.World.load(row.scene_xml), "World(30 bodies, 1 arm, time 0.00 s)"),
+    ):
+        assert repr(each) == expected
+
+
+def test_a_row_shows_its_parameters():
+    page = scengen.Pool.open(REFERENCE).row("8ed4")._repr_html_()
+    assert is_harmless(page) and "domino_single/id@0/8ed4a4577fe0" in page and ">gap_ratio<" in page
+
+
+def test_a_pool_is_a_table_with_each_parameter_in_a_column():
+    pool = scengen.Pool.open(REFERENCE)
+    rows = pool.to_arrow().to_pylist()
+    for row, stored in zip(rows, pool.rows(), strict=True):
+        assert row["id"] == stored.id and row["index"] == stored.index
+        assert {name: row[name] for name in stored.params} == stored.params
+        assert not {"params", "scene_xml", "witness", "certificate"} & set(row)
+
+
+def test_a_parameter_with_the_name_of_a_column_is_kept_apart(monkeypatch):
+    pool = scengen.Pool.open(REFERENCE)
+    rows = [(*values, {"index": 0.5}) for *values, _ in pool.columns("index", "params")]
+    monkeypatch.setattr(type(pool), "columns", lambda self, *names: ((0,) * (len(names) - 1) + row[1:] for row in rows))
+    assert pool.to_arrow().column("params.index").to_pylist() == [0.5] * len(pool)
+
+
+def test_pandas_gets_the_same_table(monkeypatch):
+    pandas = pytest.importorskip("pandas", reason="no pandas; it is in the extra dev")
+    pool = scengen.Pool.open(REFERENCE)
+    frame = pool.to_pandas()
+    assert isinstance(frame, pandas.DataFrame)
+    assert frame.drop(columns="axes").to_dict("list") == pool.to_arrow().drop_columns("axes").to_pydict()
+    assert len(pandas.read_parquet(REFERENCE, ignore_prefixes=["manifest", "scengen", "reject"])) == len(pool)
+
+
+def test_without_pandas_the_remedy_is_one_line(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(BadConfig, match="pip install pandas, or use to_arrow"):
+        scengen.Pool.open(REFERENCE).to_pandas()
+
+
+def test_pictures_of_draws_rows_and_worlds(draw):
+    if not pictures_are_possible():
+        pytest.skip("no OpenGL on this machine")
+    row = scengen.Pool.open(REFERENCE).row("8ed4")
+    world = scengen.World.load(row.scene_xml, look=ROOM)
+    of_row, of_world, of_draw = (np.array(scengen.picture(each, "agentview", 64, 48)) for each in (row, world, draw))
+    assert of_row.shape == (48, 64, 3) and np.array_equal(of_row, of_world) and not np.array_equal(of_row, of_draw)
 
 
 def test_texts_of_strangers_are_escaped(draw, tmp_path):

@@ -133,7 +133,9 @@ def limited(limit, value, *argv):
 @pytest.mark.parametrize("files", [10, 16, 20])
 @pytest.mark.slow
 def test_a_machine_without_file_descriptors_is_one_line(files, tmp_path):
-    status, told = limited("-n", files, "verify", "pool=generated/reference/domino_single-id", "level=replay", "workers=6")
+    status, told = limited(
+        "-n", files, "verify", "pool=generated/reference/domino_single-id", "level=replay", "workers=6"
+    )
     assert status == 2 and "too many open files; raise the limit of open files (ulimit -n)" in told
     assert told.count("scengen: ") == 1 and told.splitlines()[-1].startswith("scengen: ")
 
@@ -150,7 +152,9 @@ def test_a_worker_that_could_not_start_can_be_ended(monkeypatch):
 @pytest.mark.parametrize("kilobytes", [1_000_000, 1_200_000, 2_000_000, 2_600_000])
 @pytest.mark.slow
 def test_pictures_in_a_small_address_space_are_refused_in_one_line(kilobytes, tmp_path):
-    status, told = limited("-v", kilobytes, "show", "pool=generated/reference/domino_single-id", "id=8ed4", f"to={tmp_path / 'x.png'}")
+    status, told = limited(
+        "-v", kilobytes, "show", "pool=generated/reference/domino_single-id", "id=8ed4", f"to={tmp_path / 'x.png'}"
+    )
     assert status == 2 and told.count("\n") == 1 and "raise it" in told and not list(tmp_path.iterdir())
 
 

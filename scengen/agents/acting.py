@@ -21,7 +21,7 @@ from .calls import Calls
 from .models import Call, Turn
 from .primitives import DONE, BadCall, Primitive, called, next_action, primitive, tools
 from .questioning import ACT, Exam, Result
-from .scene import controller, pictures, prompt, robot, told
+from .scene import cameras, controller, pictures, prompt, robot, rules, told
 
 HISTORY = 12
 """Number of batches of pictures, and of steps in the memory, that a prompt holds (paper, App. F)."""
@@ -84,6 +84,8 @@ class Episode:
             instruction=" ".join(self.env.task_description.split()),
             robot=robot(self.exam.row.embodiment),
             controller=controller(self.exam.row.embodiment),
+            rules=rules(self.exam.row.horizon, self.exam.sheet.rules),
+            cameras=cameras(self.env),
             table=TABLE_TOP,
             half=TABLE_HALF,
             time=f"{self.env.world.time:.1f} s",
@@ -98,7 +100,7 @@ class Episode:
         return [self.exam.system, Turn("user", text, tuple(frames.values()))]
 
     def poses(self) -> list[str]:
-        """Positions [m], orientations and sizes [m] of the things, in the mode's axes; none if the model only sees."""
+        """Middles of the boxes around the things [m], orientations and sizes [m]; none if the model only sees."""
         if self.mode == SEE:
             return []
         found, world, counts = list[str](), self.env.world, dict[str, int]()
@@ -106,13 +108,11 @@ class Episode:
             if (name := self.exam.sheet.name_of(body)) is None:
                 continue
             counts[name] = counts.get(name, 0) + 1
-            pos = world.pos(body)
+            centre, size = _box(world, body)
+            pos = world.pos(body) + world.rot(body) @ centre
             if self.mode == POSES_SEEN:
                 pos = self.env.scenario.orientation.seen_at(pos)
-            told_ = [
-                np.array2string(np.round(v, 3), separator=", ")
-                for v in (pos, xyzw(world.rot(body)), _size(world, body))
-            ]
+            told_ = [np.array2string(np.round(v, 3), separator=", ") for v in (pos, xyzw(world.rot(body)), size)]
             number = f" {counts[name]}" if counts[name] > 1 else ""
             found.append(f"{name}{number}: position {told_[0]}, quaternion xyzw {told_[1]}, size {told_[2]}")
         return found
@@ -246,7 +246,7 @@ def _bodies(model: Any) -> list[str]:
     return [model.body(number).name for number in range(1, model.nbody)]
 
 
-def _size(world: World, body: str) -> Vec3:
-    """Edges of the box around a body's own geoms, in its axes [m], shape (3,)."""
+def _box(world: World, body: str) -> tuple[Vec3, Vec3]:
+    """Middle and edges of the box around a body's own geoms, in its axes [m], each of shape (3,)."""
     low, high = box_around(world.model, np.flatnonzero(world.model.geom_bodyid == world.body(body)))
-    return high - low
+    return (low + high) / 2, high - low

@@ -115,6 +115,8 @@ class Sheet:
     bodies that begin with `tile_` and have no separate line."""
     parts: list[str] = field(default_factory=list)
     """Names of parts of things, such as a handle, that are not bodies."""
+    rules: list[str] = field(default_factory=list)
+    """Rules that a question asks about and that neither the instruction nor a picture shows, as sentences."""
     facts: Mapping[str, Question] = field(default_factory=dict)
     """Questions by id."""
     order: Mapping[str, Subgoal] = field(default_factory=dict)
@@ -145,7 +147,8 @@ class Sheet:
                 raise UnknownName(f"kind of {where}, facts.{id_}", question.kind, KINDS)
             right = question.rights
             if strange := [option for option in right if option not in _options(question)]:
-                raise BadConfig(f"{where}: {id_}.right = {cut(strange[0])}; it is none of the options")
+                known = cut(", ".join(_options(question)))
+                raise BadConfig(f"{where}: {id_}.right = {cut(strange[0])}; it must be one of the options: {known}")
         for id_, subgoal in self.order.items():
             if strange := [name for name in subgoal.objects if name not in self.objects]:
                 raise UnknownName(f"object of {where}, order.{id_}", strange[0], self.objects)

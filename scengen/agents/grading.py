@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from .facts import Fact
 from .order import Order
@@ -95,6 +95,19 @@ def grade_plan(plan: Planned, order: Order, objects: Sequence[str]) -> PlanGrade
     for one, other in _misplaced(names, order):
         errors.append(("wrong order", f"{one} before {other}"))
     return PlanGrade(tuple(errors), _conditions(plan, order), order.sensing)
+
+
+def decided(grades: Mapping[str, Any], executed: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Grades of a plan that was carried out. One that reaches the goal is right in any order: what the partial
+    order says against it is a remark then. Other errors count as before.
+
+    Args:
+        grades: grades of stage 2.
+        executed: outcome of the plan; None if it was not carried out.
+    """
+    if not executed or not executed["success"] or any(kind != "wrong order" for kind, _ in grades["errors"]):
+        return {**grades, "executed": executed}
+    return {**grades, "right": True, "errors": [], "remarks": grades["errors"], "executed": executed}
 
 
 def _exists(name: str, told: str) -> bool:

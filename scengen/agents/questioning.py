@@ -62,7 +62,7 @@ class Exam:
     @property
     def scene(self) -> str:
         """The part of all prompts that describes the scene."""
-        return scene_text(self.instruction, self.row.embodiment, self.sheet.objects, self.view)
+        return scene_text(self.instruction, self.row, self.sheet, self.view)
 
     @property
     def system(self) -> Turn:

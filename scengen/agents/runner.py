@@ -32,6 +32,7 @@ from .calls import CALLS, Budget, Calls, OutOfBudget, estimate
 from .endpoint import Endpoint
 from .execution import EXECUTIONS, Executions
 from .facts import SIMPLEST_PLAN, Answer, Fact, Sheet
+from .grading import decided
 from .models import Model, RefusedRequest, Turn, made
 from .prices import prices
 from .priors import Prior, priors
@@ -314,7 +315,7 @@ def _executed(work: Work, exam: Exam, result: Result, executions: Executions) ->
     """The result of stage 2 with what became of its plan; None if the task states no moves."""
     scenario = work.task.scenario(work.row.params)
     outcome = executions.of(work.row, scenario, result.grades["plan"], exam.sheet.plan)
-    return replace(result, grades={**result.grades, "executed": outcome})
+    return replace(result, grades=decided(result.grades, outcome))
 
 
 def exams(

@@ -11,10 +11,12 @@ from ..assets.prop import TABLE_TOP
 from ..control.loop import Loop
 from ..control.osc import STEP, TURN
 from ..envs.gym import Observation, PoolEnv
-from ..envs.observations import cameras_of, streams_of
+from ..envs.observations import cameras_of, streams_of, turns_pictures
 from ..pictures.render import encode
+from ..pool import PoolRow
 from ..robots.jaw import OPENING
 from ..sim.embodiment import JAW, SUCTION, hands
+from .facts import Sheet
 
 READINGS = ("eef_pos", "eef_quat", "gripper_qpos", "force_torque")
 """Streams whose readings are given to the model, as endings of their names."""
@@ -24,14 +26,29 @@ HANDS = {JAW: f"a parallel jaw that opens {1000 * OPENING:.0f} mm wide", SUCTION
 """Hands as text, by their names."""
 
 
+MOUNTED = {
+    "rgb_exo_right_cam": "stands beyond the table, above it, and looks down at the robot. Right in its picture is the "
+    "robot's left (+y), up is towards the robot (-x).",
+    "rgb_exo_left_cam": "stands at the robot's left (y = 1.3 m) and looks along -y. Right in its picture is towards "
+    "the robot (-x), up is +z.",
+    "rgb_gripper_cam": "is on the hand, which points down at the start, and looks along the fingers. Right in its "
+    "picture is then the robot's right (-y), up is away from the robot (+x).",
+    "robot1_rgb_gripper_cam": "is on the left hand in the same way.",
+}
+"""Cameras that a model gets, by the paper's names, and where they stand. The paper's rgb_ego_cam is left out: it
+shows nearly what rgb_exo_right_cam shows."""
+
+
 @dataclass(frozen=True)
 class View:
     """Pictures and readings of a scene: the slots of a prompt that depend on the scenario."""
 
     frames: Mapping[str, bytes]
-    """JPEG pictures by name, such as `agentview at 0.0 s`; none for a model without pictures."""
+    """JPEG pictures by name, such as `rgb_exo_left_cam at 0.0 s`; none for a model without pictures."""
     readings: tuple[str, ...]
     """Readings of the sensors, one line for each moment."""
+    cameras: str = ""
+    """Places of the cameras as text; empty without pictures."""
 
 
 def observe(env: PoolEnv, scenario: str, moments: int, spacing: float) -> View:
@@ -51,13 +68,24 @@ def observe(env: PoolEnv, scenario: str, moments: int, spacing: float) -> View:
         when = f"{moment * spacing:.1f} s"
         frames |= pictures(env, observation, when)
         readings.append(f"{when}: {told(observation)}")
-    return View(frames, tuple(readings))
+    return View(frames, tuple(readings), cameras(env))
 
 
 def pictures(env: PoolEnv, observation: Observation, when: str) -> dict[str, bytes]:
-    """The cameras' pictures of an observation as JPEG, by names such as `agentview at 0.0 s`."""
-    seen = {camera: observation[name].astype(np.uint8) for name, camera in env.observed.cameras.items()}
-    return {f"{camera} at {when}": encode(picture, "jpeg") for camera, picture in seen.items()}
+    """The cameras' pictures of an observation as JPEG, by names such as `rgb_exo_left_cam at 0.0 s`."""
+    return {f"{name} at {when}": encode(observation[name].astype(np.uint8), "jpeg") for name in env.cameras}
+
+
+def cameras(env: PoolEnv) -> str:
+    """Where the cameras of an environment stand, as text; empty if it has none."""
+    if not env.cameras:
+        return ""
+    return prompt("cameras", names=env.cameras, told=MOUNTED, turned=turns_pictures(env.task.family)).strip()
+
+
+def rules(horizon: float, further: Sequence[str]) -> str:
+    """The rules of a task as text: its time limit [s], and what its sheet adds."""
+    return prompt("rules", horizon=horizon, rules=further).strip()
 
 
 def told(observation: Observation) -> str:
@@ -71,7 +99,7 @@ def told(observation: Observation) -> str:
 def streams(embodiment: str, seeing: bool) -> list[str]:
     """Names of the streams and cameras that a model gets."""
     found = [name for name in streams_of(embodiment) if name.endswith(READINGS)]
-    return [*found, *cameras_of(embodiment)] if seeing else found
+    return [*found, *(name for name in cameras_of(embodiment) if name in MOUNTED)] if seeing else found
 
 
 def robot(embodiment: str) -> str:
@@ -104,15 +132,18 @@ def prompt(name: str, **slots: object) -> str:
     return _templates().get_template(f"{name}.txt").render(**slots)
 
 
-def scene_text(instruction: str, embodiment: str, objects: Sequence[str], view: View) -> str:
+def scene_text(instruction: str, row: PoolRow, sheet: Sheet, view: View) -> str:
     """The part of all prompts that describes task, robot and scene."""
+    embodiment = row.embodiment
     return prompt(
         "scene",
         instruction=" ".join(instruction.split()),
         robot=robot(embodiment),
         controller=controller(embodiment),
         table=TABLE_TOP,
-        objects=objects,
+        objects=sheet.objects,
+        rules=rules(row.horizon, sheet.rules),
+        cameras=view.cameras,
         frames=list(view.frames),
         readings=view.readings,
     )

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 
@@ -27,7 +28,7 @@ class Ball(Prop):
     have their own parameter for it."""
     rgba: Rgba = (0.62, 0.65, 0.70, 1.0)
 
-    @property
+    @cached_property
     def mass(self) -> float:
         """Mass [kg]."""
         return self.density * 4.0 / 3.0 * math.pi * self.radius**3

@@ -1,6 +1,7 @@
 """A shallow bin: a rectangular floor with four walls that are lower than the packed pieces."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -28,12 +29,12 @@ class Bin(Prop):
     friction: float = param(0.4, "1", 0.05, 1.5)
     rgba: Rgba = (0.30, 0.36, 0.44, 1.0)
 
-    @property
+    @cached_property
     def area(self) -> float:
         """Area of the floor inside [m^2]."""
         return self.width * self.length
 
-    @property
+    @cached_property
     def outer(self) -> tuple[float, float]:
         """Outer lengths along x and y, walls included [m]."""
         return self.width + 2 * self.wall, self.length + 2 * self.wall

@@ -10,6 +10,7 @@ At an edge of the table the board stays as long as its centre of mass is over th
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -43,17 +44,17 @@ class Board(Prop):
     friction: float = param(0.35, "1", 0.05, 1.5, hidden=True)
     rgba: Rgba = (0.86, 0.70, 0.45, 1.0)
 
-    @property
+    @cached_property
     def size(self) -> Vec3:
         """Edges along x, y and z [m]."""
         return np.array([self.length, self.width, self.thickness])
 
-    @property
+    @cached_property
     def strip_mass(self) -> float:
         """Mass of the strip that puts the centre of mass at `off_centre` [kg]."""
         return self.mass * (2 * self.off_centre + STRIP_WIDTH) / self.width
 
-    @property
+    @cached_property
     def tipping_overhang(self) -> float:
         """Overhang at which the board tips, if the strip's side overhangs a parallel edge [m]."""
         return self.width / 2 - self.off_centre

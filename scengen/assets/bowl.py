@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 
@@ -42,22 +43,22 @@ class Bowl(Turned):
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: Rgba = (0.36, 0.52, 0.62, 1.0)
 
-    @property
+    @cached_property
     def height(self) -> float:
         """Height of the rim above the ground [m]."""
         return self.depth
 
-    @property
+    @cached_property
     def centre(self) -> float:
         """Height of the centre of both spheres, which is equally far from the edge of the foot and from the rim [m]."""
         return ((self.radius**2 - self.foot**2) / (self.depth - FOOT_PROTRUSION) + self.depth + FOOT_PROTRUSION) / 2
 
-    @property
+    @cached_property
     def outer(self) -> float:
         """Radius of the outer sphere [m]."""
         return math.hypot(self.foot, self.centre - FOOT_PROTRUSION)
 
-    @property
+    @cached_property
     def inner(self) -> float:
         """Radius of the inner sphere [m]. Only floor and bead reach into it, no other part of the shell."""
         return self.outer - self.wall
@@ -66,7 +67,7 @@ class Bowl(Turned):
         """Height of the dome of a bowl that is upside down over its rim, at a distance from the axis [m]."""
         return self.depth - self.centre + math.sqrt(self.outer**2 - radius**2)
 
-    @property
+    @cached_property
     def bead_slope(self) -> float:
         """Angle by which the bead, at half its height, leans outwards [rad]."""
         (low, foot), (out, top) = self.sections[-1].corners[:2]
@@ -83,7 +84,7 @@ class Bowl(Turned):
         up = (UP - axis[2] * axis) / math.hypot(axis[0], axis[1])
         return pos + self.depth * axis + (self.radius - self.bead / 2) * up
 
-    @property
+    @cached_property
     def floor(self) -> float:
         """Height of the floor inside [m]."""
         return self._corner(self.inner / math.cos(self._band_angle / 2), self._foot_angle)[1]
@@ -105,12 +106,12 @@ class Bowl(Turned):
         walls = [Section(f"shell_{i}", corners, leaky=True) for i, corners in enumerate(shell)]
         return [Section("bottom", tuple(bottom)), *walls, Section("bead", tuple(bead), leaky=True)]
 
-    @property
+    @cached_property
     def _foot_angle(self) -> float:
         """Angle at the centre of the spheres between the axis and the edge of the foot [rad]."""
         return math.atan2(self.foot, self.centre - FOOT_PROTRUSION)
 
-    @property
+    @cached_property
     def _band_angle(self) -> float:
         """Angle of one band [rad]: the bands divide the shell between the edge of the foot and the bead."""
         return (math.acos((self.centre - self.depth + BEAD_HEIGHT) / self.outer) - self._foot_angle) / SHELL_BANDS

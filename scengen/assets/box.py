@@ -3,6 +3,7 @@
 import abc
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -50,7 +51,7 @@ class Domino(Box):
     def size(self) -> Vec3:
         return np.array([self.thickness, self.width, self.height])
 
-    @property
+    @cached_property
     def tipping_angle(self) -> float:
         """Tilt at which the centre of mass passes over the edge of the foot [rad]."""
         return math.atan2(self.thickness, self.height)
@@ -118,22 +119,22 @@ class LoadedCube(Box):
     def size(self) -> Vec3:
         return np.array([self.edge] * 3)
 
-    @property
+    @cached_property
     def com(self) -> float:
         """Distance of the centre of mass from the middle, along x [m]."""
         return self.lean * self.edge
 
-    @property
+    @cached_property
     def slug(self) -> float:
         """Edge of the slug, which is a cube [m]."""
         return (SLUG_SHARE * self.mass / LEAD_DENSITY) ** (1 / 3)
 
-    @property
+    @cached_property
     def steepest(self) -> float:
         """Largest possible `lean`: the slug touches the side from inside."""
         return SLUG_SHARE * (self.edge - self.slug) / (2 * self.edge)
 
-    @property
+    @cached_property
     def inertia(self) -> Vec3:
         """Principal moments of inertia at the centre of mass, about x, y and z [kg m^2]."""
         foam, slug = (1 - SLUG_SHARE) * self.mass, SLUG_SHARE * self.mass

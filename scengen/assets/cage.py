@@ -12,6 +12,7 @@ stick, and a wider one does not pass.
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -75,34 +76,34 @@ class HoledCage(Prop):
 
     # --- geometry, in the cage's own axes -------------------------------------------------
 
-    @property
+    @cached_property
     def size(self) -> Vec3:
         """Outer edges along x, y and z [m]."""
         return np.array([self.length, self.width, self.height])
 
-    @property
+    @cached_property
     def middle(self) -> Vec3:
         """Centre of the cuboid [m]."""
         return np.array([0.0, 0.0, self.height / 2])
 
-    @property
+    @cached_property
     def cavity(self) -> Vec3:
         """Inner edges along x, y and z [m]."""
         return self.size - 2 * self.wall
 
-    @property
+    @cached_property
     def normal(self) -> Vec3:
         """Unit vector out of the holed face."""
         axis, sign, _ = FACES[self.face]
         return sign * np.eye(3)[axis]
 
-    @property
+    @cached_property
     def hole_centre(self) -> Vec3:
         """Centre of the hole, halfway through the wall [m]."""
         axis, _, along = FACES[self.face]
         return self.middle + (self.size[axis] - self.wall) / 2 * self.normal + self.offset * np.eye(3)[along]
 
-    @property
+    @cached_property
     def margin(self) -> float:
         """Smallest distance from the rim of the hole to the walls beside its face [m]; negative: it does not fit."""
         axis, _, along = FACES[self.face]

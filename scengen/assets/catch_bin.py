@@ -1,6 +1,7 @@
 """A bin with a handle: deep, so that balls that fall in stay in; light, so that a jaw can pull it over the table."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -60,12 +61,12 @@ class CatchBin(Prop):
         pos = [-outer_x - self.reach / 2, 0.0, (self.rim + HANDLE_HEIGHT) / 2]
         solid(body, "handle", size / 2, pos, density=HANDLE_DENSITY, friction=HANDLE_FRICTION, rgba=self.rgba)
 
-    @property
+    @cached_property
     def outer(self) -> tuple[float, float]:
         """Outer lengths of the bin along x and y, walls included, without the handle [m]."""
         return self.width + 2 * self.wall, self.length + 2 * self.wall
 
-    @property
+    @cached_property
     def rim(self) -> float:
         """Height of the rim [m]."""
         return self.floor + self.depth
@@ -75,7 +76,7 @@ class CatchBin(Prop):
         x, y, z = np.abs(place)
         return bool(x < self.width / 2 and y < self.length / 2 and z < self.rim - depth)
 
-    @property
+    @cached_property
     def handle(self) -> Vec3:
         """Grasp point on the handle, in the bin's axes [m]."""
         return np.array([-self.outer[0] / 2 - 0.6 * self.reach, 0.0, 0.0]) + (self.rim - GRASP_DEPTH) * UP

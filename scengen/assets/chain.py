@@ -58,12 +58,12 @@ class Chain:
     slab: Domino
     defect: Defect | None = None
 
-    @property
+    @cached_property
     def astray(self) -> bool:
         """Whether it leads to a slab that does not count."""
         return self.defect is not None and self.defect.kind == DECOY
 
-    @property
+    @cached_property
     def gaps(self) -> NDArray[np.float64]:
         """Free spaces between the tiles and before the slab [m], shape (count,).
 
@@ -76,7 +76,7 @@ class Chain:
         total = self.count * self.gap / widest
         return widest * root_scalar(lambda ratio: np.sum(ratio**powers) - total, bracket=(0.0, 1.0)).root ** powers
 
-    @property
+    @cached_property
     def feet(self) -> dict[int, Vec3]:
         """Positions of the tiles by their index, and of the slab as `feet[count]` [m]. A missing tile has none.
 
@@ -123,7 +123,7 @@ class Lanes:
                     ends.append(foot + across)
         return {**feet, "slab": np.mean(ends, axis=0)}
 
-    @property
+    @cached_property
     def slab_width(self) -> float:
         """Width of the slab that counts [m]: that of one chain's, and the distance of the outermost lanes."""
         one, *others = (chain.slab for chain in self.chains if not chain.astray)
@@ -148,7 +148,7 @@ class Lanes:
         chain = self.chains[int(name.split("_")[1])]
         return chain.starter if name.endswith("_0") else chain.tile
 
-    @property
+    @cached_property
     def room(self) -> float:
         """Smallest free space along y between tiles of different chains, and between the slabs [m]; negative where they
         overlap."""

@@ -1,6 +1,7 @@
 """A box of crackers in several sizes, with a slippery surface."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class CrackerBox(Box):
     friction: float = param(0.20, "1", 0.02, 0.60)
     rgba: Rgba = (0.75, 0.16, 0.14, 1.0)
 
-    @property
+    @cached_property
     def mass(self) -> float:  # type: ignore[override]  # follows from the size, as the filling is always the same
         """Mass of the box, full of the same filling [kg]."""
         return REAL_MASS * self.scale**3

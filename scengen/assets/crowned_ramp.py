@@ -10,6 +10,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -53,17 +54,17 @@ class CrownedRamp(Prop):
     friction: float = param(0.6, "1", 0.05, 1.5)
     rgba: Rgba = (0.72, 0.70, 0.64, 1.0)
 
-    @property
+    @cached_property
     def fall(self) -> float:
         """Descent along the ridge per length [1]."""
         return math.tan(math.radians(self.pitch))
 
-    @property
+    @cached_property
     def aside(self) -> float:
         """Descent away from the ridge per length [1]."""
         return math.tan(math.radians(self.lean))
 
-    @property
+    @cached_property
     def drift(self) -> float:
         """Sideways distance by which a ball drifts as it rolls from one end to the other [m].
 

@@ -3,6 +3,7 @@
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -115,16 +116,16 @@ class Cup(Turned):
 
     # --- handle ---------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def has_handle(self) -> bool:
         return self.handle >= MIN_HANDLE
 
-    @property
+    @cached_property
     def grip(self) -> Vec3:
         """Middle of the handle's upright bar, in the cup's axes [m]."""
         return np.array([self._upright_distance, 0.0, (HANDLE_BOTTOM + HANDLE_TOP) / 2 * self.height])
 
-    @property
+    @cached_property
     def _upright_distance(self) -> float:
         """Distance of the upright bar's middle line from the cup's axis [m]."""
         return self.outer((HANDLE_BOTTOM + HANDLE_TOP) / 2 * self.height) + self.handle - self.bar / 2

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from ..params import param
 from .prop import Rgba, show
@@ -38,27 +39,27 @@ class Dish(Turned):
     def stance(self) -> tuple[float, float]:
         return self.foot, self.thickness
 
-    @property
+    @cached_property
     def foot(self) -> float:
         """Radius of the flat part on which the dish stands [m]."""
         return self.radius - self.rim
 
-    @property
+    @cached_property
     def slope(self) -> float:
         """Slope of the rim [rad]; also the tilt of the dish when its rim is pressed to the ground."""
         return math.radians(self.incline)
 
-    @property
+    @cached_property
     def rise(self) -> float:
         """Height of the rim's lower edge above the ground [m]."""
         return self.rim * math.tan(self.slope)
 
-    @property
+    @cached_property
     def height(self) -> float:
         """Height of the rim's upper edge above the ground [m]."""
         return self.rise + self.thickness
 
-    @property
+    @cached_property
     def raised(self) -> float:
         """Height of the rim's lower edge while the opposite side is pressed to the ground [m]."""
         return self.rise * math.cos(self.slope) + (self.radius + self.foot) * math.sin(self.slope)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Self
 
 import mujoco
@@ -52,7 +53,7 @@ class Enclosure(Prop):
             wall = {"friction": 0.0, "condim": 1, "solref": bouncy, "priority": PRIORITY + 1, "rgba": self.rgba}
             solid(body, name, size, pos, **wall)
 
-    @property
+    @cached_property
     def size(self) -> tuple[float, float]:
         """Lengths of its outline on the ground along x and y [m]. The middle of the outline is at x = `depth` / 2."""
         return self.depth + self.thickness, self.width + 2 * self.thickness
@@ -126,7 +127,7 @@ class PlacedEnclosure:
         """An enclosure around a place [m], open against the direction `yaw` [rad]."""
         return cls(enclosure, middle - enclosure.depth / 2 * about_z(yaw)[:, 0], yaw)
 
-    @property
+    @cached_property
     def outline(self) -> Outline:
         """Outline of the enclosure, seen from above."""
         middle = self.mouth + self.enclosure.depth / 2 * about_z(self.yaw)[:, 0]

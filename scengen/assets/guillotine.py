@@ -20,6 +20,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import NamedTuple
 
 Length = Fraction | int
@@ -43,15 +44,15 @@ class Rect:
         if not (self.x0 < self.x1 and self.y0 < self.y1):
             raise ValueError(f"a rectangle from ({self.x0}, {self.y0}) to ({self.x1}, {self.y1}) is empty")
 
-    @property
+    @cached_property
     def width(self) -> Fraction:
         return self.x1 - self.x0
 
-    @property
+    @cached_property
     def height(self) -> Fraction:
         return self.y1 - self.y0
 
-    @property
+    @cached_property
     def area(self) -> Fraction:
         return self.width * self.height
 
@@ -80,17 +81,17 @@ class Ell:
         if not (inside and corner):
             raise ValueError("not an L; the notch must lie at one corner, and be smaller than the rectangle in x and y")
 
-    @property
+    @cached_property
     def area(self) -> Fraction:
         return self.bounds.area - self.notch.area
 
-    @property
+    @cached_property
     def quarter(self) -> int:
         """Number of counterclockwise quarter turns that bring an L with its notch at the upper right to this pose."""
         right, upper = self.notch.x1 == self.bounds.x1, self.notch.y1 == self.bounds.y1
         return {(True, True): 0, (False, True): 1, (False, False): 2, (True, False): 3}[right, upper]
 
-    @property
+    @cached_property
     def sides(self) -> tuple[Fraction, Fraction, Fraction, Fraction]:
         """Width, height, width of the upright arm and height of the lying arm, with the notch at the upper right."""
         across, along = (self.bounds.width, self.notch.width), (self.bounds.height, self.notch.height)
@@ -98,12 +99,12 @@ class Ell:
             across, along = along, across
         return across[0], along[0], across[0] - across[1], along[0] - along[1]
 
-    @property
+    @cached_property
     def middle(self) -> tuple[Fraction, Fraction]:
         """Centre of `bounds`."""
         return (self.bounds.x0 + self.bounds.x1) / 2, (self.bounds.y0 + self.bounds.y1) / 2
 
-    @property
+    @cached_property
     def corners(self) -> list[tuple[Fraction, Fraction]]:
         """The outline, counterclockwise: six points."""
         b, n = self.bounds, self.notch

@@ -14,6 +14,7 @@ underside. The tip points to +y, or to -y if the hook is mirrored.
 import abc
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -57,12 +58,12 @@ class Hook(Prop):
     def aside(self) -> float:
         """Distance by which it protrudes beside the handle's face, on the side of the tip [m]."""
 
-    @property
+    @cached_property
     def depth(self) -> float:
         """Distance that the handle must advance for the tip to pass a thing that touches the pulling face [m]."""
         return 0.0
 
-    @property
+    @cached_property
     def side(self) -> float:
         """Sign of y of the tip: 1 or -1."""
         return 1.0
@@ -72,7 +73,7 @@ class Hook(Prop):
     def engaging(self) -> float:
         """Width of the pulling face beside the handle, or of the opening of the bend [m]."""
 
-    @property
+    @cached_property
     def corners(self) -> NDArray[np.float64]:
         """Corners of its bars on the ground [m], shape (n, 3)."""
         corners = []
@@ -131,7 +132,7 @@ class LHook(StraightHook):
     mirrored: int = param(0, "1 = tip to the right", 0, 1)
     rgba: Rgba = (0.20, 0.45, 0.70, 1.0)
 
-    @property
+    @cached_property
     def side(self) -> float:
         return -1.0 if self.mirrored else 1.0
 
@@ -162,7 +163,7 @@ class JHook(Hook):
     mirrored: int = param(0, "1 = tip to the right", 0, 1)
     rgba: Rgba = (0.20, 0.45, 0.70, 1.0)
 
-    @property
+    @cached_property
     def side(self) -> float:
         return -1.0 if self.mirrored else 1.0
 
@@ -174,7 +175,7 @@ class JHook(Hook):
     def aside(self) -> float:
         return 2 * self.radius
 
-    @property
+    @cached_property
     def depth(self) -> float:
         return self.radius + self.barb
 

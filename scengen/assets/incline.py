@@ -8,6 +8,7 @@ lip  o--
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -59,7 +60,7 @@ class Incline(Prop):
     mass: float = param(0.5, "kg", 0.1, 2.0)
     rgba: Rgba = (0.36, 0.50, 0.66, 1.0)
 
-    @property
+    @cached_property
     def turns(self) -> float:
         """Range of the hinge [rad]."""
         return math.radians(self.most - self.least)
@@ -72,7 +73,7 @@ class Incline(Prop):
         """
         return about_y(-math.radians(self.least) - turned)
 
-    @property
+    @cached_property
     def resting(self) -> NDArray[np.float64]:
         """Orientation of a block that lies on the slab at the start (wxyz)."""
         turn = np.empty(4)
@@ -124,7 +125,7 @@ class Load(Bounded):
     friction: float = param(0.6, "1", 0.15, 1.0, hidden=True)
     away: float = param(0.04, "m", 0.02, 0.12)  # distance of its middle from the lip
 
-    @property
+    @cached_property
     def colour(self) -> Rgba:
         """Colour that shows the friction, in proportion: pale at 0, dark at 1."""
         pale, dark = np.array([0.96, 0.93, 0.86]), np.array([0.10, 0.08, 0.12])
@@ -147,7 +148,7 @@ class LoadedIncline:
     rate: float
     """Rate of the tilt [rad/s]."""
 
-    @property
+    @cached_property
     def lip(self) -> Vec3:
         """Middle of the lip [m]."""
         return self.foot + self.incline.lip * UP
@@ -164,12 +165,12 @@ class LoadedIncline:
 
     # --- mechanics ------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def sequence(self) -> tuple[int, ...]:
         """Lanes in the order in which their blocks slide."""
         return tuple(sorted(range(len(self.loads)), key=lambda lane: self.loads[lane].friction))
 
-    @property
+    @cached_property
     def end(self) -> float:
         """Time at which the incline is at its largest angle [s]."""
         return self.start + self.incline.turns / self.rate

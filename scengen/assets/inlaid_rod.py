@@ -8,6 +8,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -44,28 +45,28 @@ class InlaidRod(Box):
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.height])
 
-    @property
+    @cached_property
     def _discriminant(self) -> float:
         """Discriminant of the equation for the thickness of the inlay [m^2]; negative if no inlay suffices."""
         c, w = abs(self.com), self.width
         return (w - 2 * c) ** 2 - 8 * c * w * WOOD_DENSITY / (LEAD_DENSITY - WOOD_DENSITY)
 
-    @property
+    @cached_property
     def possible(self) -> bool:
         """Whether an inlay can move the centre of mass that far."""
         return 2 * abs(self.com) < self.width and self._discriminant >= 0.0
 
-    @property
+    @cached_property
     def inlay(self) -> float:
         """Thickness of the inlay [m]."""
         return (self.width - 2 * abs(self.com) - math.sqrt(max(self._discriminant, 0.0))) / 2
 
-    @property
+    @cached_property
     def mass(self) -> float:  # type: ignore[override]
         """Mass [kg]."""
         return sum(mass for mass, _, _ in self._parts)
 
-    @property
+    @cached_property
     def _parts(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Mass [kg], thickness along y [m] and place along y [m] of wood and lead."""
         side, thick = math.copysign(1.0, self.com), self.inlay
@@ -76,7 +77,7 @@ class InlaidRod(Box):
             (LEAD_DENSITY * face * thick, thick, side * wood / 2),
         )
 
-    @property
+    @cached_property
     def inertia(self) -> Vec3:
         """Principal moments of inertia at the centre of mass, about x, y and z [kg m^2]."""
         total = np.zeros(3)

@@ -1,6 +1,7 @@
 """A keyboard with the letters of a QWERTY layout. Each cap is a separate body, so that contacts identify the key."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -47,7 +48,7 @@ class Keyboard(Prop):
     """Mass of the plate. Typewriter keyboards without their caps weigh 0.3 to 1.2 kg."""
     rgba: Rgba = (0.86, 0.86, 0.84, 1.0)
 
-    @property
+    @cached_property
     def size(self) -> Vec3:
         """Edges of the plate along x and y, and total height [m]."""
         return np.array([len(ROWS) * self.pitch, (len(ROWS[0]) + 0.5) * self.pitch, self.height])

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import mujoco
@@ -81,12 +82,12 @@ class LPiece(Prop):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def area(self) -> float:
         """Area of the broad face [m^2]."""
         return self.width * self.lying + self.upright * (self.length - self.lying)
 
-    @property
+    @cached_property
     def parts(self) -> tuple[Part, Part]:
         """The lying arm over the whole width, and the upright arm beyond it."""
         return (
@@ -98,7 +99,7 @@ class LPiece(Prop):
         """Outlines of both parts, seen from above, of a piece at `pos` [m] with a `yaw` [rad]."""
         return [corners(pos, yaw, part[2:], part[:2]) for part in self.parts]
 
-    @property
+    @cached_property
     def centroid(self) -> Point:
         """Centre of mass, seen from above [m]."""
         (xa, ya, *a), (xb, yb, *b) = self.parts
@@ -117,7 +118,7 @@ class LPiece(Prop):
             raise ValueError(f"no arm of the piece is {2000 * cup:.0f} mm wide, as the cup needs; give a smaller cup")
         return min(points, key=lambda p: math.dist(p, self.centroid))
 
-    @property
+    @cached_property
     def edges(self) -> list[tuple[Point, Point]]:
         """The six sides of the base's outline, moved inwards by the radius of the edges, seen from above [m]."""
         r, x, y = self.rounding, self.width / 2, self.length / 2

@@ -1,7 +1,7 @@
 """A body of convex pieces, and its representation as plain data in a manifest."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
 import mujoco
@@ -14,6 +14,8 @@ from .turned import FOOT_RADIUS
 
 Points = NDArray[np.float64]
 """Points, shape (n, 3) [m]."""
+Palette = tuple[Rgba, ...]
+"""Colours."""
 
 DIGITS = 7
 """Number of decimals of a length in a manifest [m]. Simulations always use the rounded lengths."""
@@ -60,8 +62,20 @@ class MeshProp(Prop):
     """Inertia about the centre of mass [kg m^2]."""
     friction: float = 0.6
     rgba: Rgba = (0.72, 0.66, 0.55, 1.0)
+    palette: Palette = ()
+    """Colours of the mesh that pictures show; none for `rgba` alone. Manifests do not hold them."""
+    painted: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Index in the palette of each triangle, shape (n,)."""
     bare: bool = False
     """Whether pictures show the pieces instead of the mesh."""
+
+    def looks(self) -> Iterator[tuple[Rgba, Points, NDArray[np.int64]]]:
+        """Colour, vertices and triangles of each part of the mesh that pictures show."""
+        if not self.palette:
+            yield self.rgba, self.vertices, self.faces
+        for k, rgba in enumerate(self.palette):
+            used, faces = np.unique(self.faces[self.painted == k], return_inverse=True)
+            yield rgba, self.vertices[used], faces.reshape(-1, 3)
 
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         body.explicitinertial, body.mass, body.ipos = True, self.mass, self.com
@@ -83,8 +97,12 @@ class MeshProp(Prop):
             solid(body, f"foot_{k}", [FOOT_RADIUS], foot, type=SPHERE, friction=self.friction, mass=0.0, group=3)
         if self.bare:
             return
-        spec.add_mesh(name="look", uservert=self.vertices.ravel().tolist(), userface=self.faces.ravel().tolist())
-        shown(body, "look", self.rgba, type=MESH).meshname = "look"
+        for k, (rgba, vertices, faces) in enumerate(self.looks()):
+            name = f"look_{k}" if k else "look"
+            look = spec.add_mesh(name=name, uservert=vertices.ravel().tolist(), userface=faces.ravel().tolist())
+            if self.palette:
+                look.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # a patch encloses no volume
+            shown(body, name, rgba, type=MESH).meshname = name
 
     def written(self) -> dict[str, Any]:
         """The body as plain data. Lengths are rounded to `DIGITS`; masses and inertias keep all digits."""
@@ -102,7 +120,7 @@ class MeshProp(Prop):
         Raises:
             ValueError: the data do not describe a body.
         """
-        known = {field.name for field in fields(cls)} - {"rgba", "bare"}
+        known = {field.name for field in fields(cls)} - {"rgba", "bare", "palette", "painted"}
         if not isinstance(data, Mapping) or set(data) != known:
             raise ValueError(f"expected {', '.join(sorted(known))}")
         corners = tuple(_numbers("corners", points, (-1, 3)) for points in data["corners"])

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class Peg(Box):
     def size(self) -> Vec3:
         return np.array([self.width, self.width, self.length])
 
-    @property
+    @cached_property
     def tipping_angle(self) -> float:
         """Tilt at which the centre of mass passes over an edge of the base [rad]."""
         return math.atan2(self.width, self.length)

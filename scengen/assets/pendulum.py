@@ -19,6 +19,7 @@ kind. (Landau and Lifshitz, Mechanics, section 11; the familiar 1 + A^2 / 16 + 1
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 from scipy.special import ellipj, ellipk, ellipkinc
@@ -111,24 +112,24 @@ class Pendulum(Prop):
         for geom in bob.geoms:  # drag of an ellipsoid with all coefficients zero: no air resistance
             geom.fluid_ellipsoid, geom.fluid_coefs = 1, [0.0] * 5
 
-    @property
+    @cached_property
     def size(self) -> tuple[float, float]:
         """Lengths of its outline on the ground along x and y [m]."""
         return 2 * FOOT_SIZE, 2 * self.span + FOOT_SIZE
 
     # --- mechanics ------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def mass(self) -> float:
         """Mass of the bob [kg]. The rod has no mass."""
         return self.density * 4.0 / 3.0 * math.pi * self.radius**3
 
-    @property
+    @cached_property
     def inertia(self) -> float:
         """Inertia about the axle [kg m^2]."""
         return self.mass * (self.length**2 + 0.4 * self.radius**2)
 
-    @property
+    @cached_property
     def pace(self) -> float:
         """Angular frequency of small swings [rad/s]."""
         return math.sqrt(GRAVITY * self.mass * self.length / self.inertia)

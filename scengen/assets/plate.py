@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from ..params import param
 from .prop import Rgba, show
@@ -41,12 +42,12 @@ class Plate(Turned):
     def stance(self) -> tuple[float, float]:
         return self.foot, self.thickness
 
-    @property
+    @cached_property
     def height(self) -> float:
         """Height of the lip's upper side above the ground [m]."""
         return self.rise + self.thickness
 
-    @property
+    @cached_property
     def pressed_tilt(self) -> float:
         """Tilt of the plate when its lip is pressed to the ground [rad]. It turns about the edge of its foot."""
         return math.atan2(self.rise, self.radius - self.foot)

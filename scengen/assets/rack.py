@@ -9,6 +9,7 @@
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -44,17 +45,17 @@ class TierRack(Prop):
     friction: float = param(0.4, "1", 0.05, 1.5)
     rgba: Rgba = (0.60, 0.48, 0.36, 1.0)
 
-    @property
+    @cached_property
     def outer(self) -> tuple[float, float]:
         """Outer lengths along x and y, walls included [m]."""
         return self.width + 2 * self.board, self.depth + self.board
 
-    @property
+    @cached_property
     def mouth(self) -> float:
         """Position of the open side along y [m]."""
         return -self.outer[1] / 2
 
-    @property
+    @cached_property
     def top(self) -> float:
         """Height of the roof's upper side above the ground [m]."""
         return self.floor(STOREYS)

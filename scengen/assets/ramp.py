@@ -22,6 +22,7 @@ step.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -87,17 +88,17 @@ class Ramp(Prop):
 
     # --- geometry of the floor, by the distance s from the middle of the valley -----------
 
-    @property
+    @cached_property
     def slope(self) -> float:
         """Slope of the inclines [rad]."""
         return math.radians(self.angle)
 
-    @property
+    @cached_property
     def foot(self) -> float:
         """Position s at which the far incline starts: half the length of the arc [m]."""
         return self.bend * self.slope
 
-    @property
+    @cached_property
     def top(self) -> float:
         """Position s at which the far incline ends [m]."""
         return self.foot + (self.span / 2 - self.bend * math.sin(self.slope)) / math.cos(self.slope)
@@ -114,12 +115,12 @@ class Ramp(Prop):
             return self.bend * math.acos(1.0 - max(0.0, height) / self.bend)
         return self.foot + (height - foot) / math.sin(self.slope)
 
-    @property
+    @cached_property
     def goal(self) -> float:
         """Height of the patch's middle above the middle of the valley [m]."""
         return self.level * self.height(self.top)
 
-    @property
+    @cached_property
     def patch(self) -> tuple[float, float]:
         """Positions s of the lower and upper edge of the patch [m]."""
         return self.at_height(self.goal - self.band / 2), self.at_height(self.goal + self.band / 2)
@@ -155,12 +156,12 @@ class Ramp(Prop):
 
     # --- motion of a ball -----------------------------------------------------------------
 
-    @property
+    @cached_property
     def arrival(self) -> float:
         """Highest speed at the patch's lower edge at which a sliding ball still turns back on the patch [m/s]."""
         return math.sqrt(2 * GRAVITY * self.band)
 
-    @property
+    @cached_property
     def rolls(self) -> bool:
         """Whether a solid ball rolls on the inclines without slipping: mu > 2/7 tan(slope)."""
         return self.friction > 2.0 / 7.0 * math.tan(self.slope)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -34,12 +35,12 @@ class RingRack(Prop):
     friction: float = param(0.4, "1", 0.05, 1.5)
     rgba: Rgba = (0.60, 0.48, 0.36, 1.0)
 
-    @property
+    @cached_property
     def outer(self) -> float:
         """Radius of the circle around the whole rack [m]."""
         return (self.radius + self.board) / math.cos(math.pi / RING_BOARDS)
 
-    @property
+    @cached_property
     def top(self) -> float:
         """Height of the ring's upper edge above the ground [m]."""
         return self.plinth + self.height

@@ -8,6 +8,7 @@ It balances on an edge below its centre of mass, which is SLUG_SHARE times as fa
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -40,12 +41,12 @@ class Rod(Box):
     def size(self) -> Vec3:
         return np.array([self.width, self.length, self.width])
 
-    @property
+    @cached_property
     def slug(self) -> float:
         """Position of the slug along y, from the middle [m]."""
         return self.com / SLUG_SHARE
 
-    @property
+    @cached_property
     def inertia(self) -> Vec3:
         """Principal moments of inertia at the centre of mass, about x, y and z [kg m^2]."""
         tube, slug = (1 - SLUG_SHARE) * self.mass, SLUG_SHARE * self.mass

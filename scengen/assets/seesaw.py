@@ -19,6 +19,7 @@ angle.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -133,23 +134,23 @@ class Seesaw(Prop):
         tilt = math.atan(self.moment(loads) / self.stiffness(loads))
         return min(max(tilt, -self.steepest), self.steepest)
 
-    @property
+    @cached_property
     def _deck(self) -> Load:
         return self.mass, -self.pivot_offset, -self.thickness / 2
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def axle(self) -> float:
         """Height of the axle over the ground [m]."""
         return self.height + self.drop
 
-    @property
+    @cached_property
     def steepest(self) -> float:
         """Tilt on a stop [rad]."""
         return math.radians(self.stop)
 
-    @property
+    @cached_property
     def dip(self) -> float:
         """Distance by which the end of the longer arm goes down from level to its stop [m]."""
         return max(self.arm(-1), self.arm(1)) * math.sin(self.steepest)

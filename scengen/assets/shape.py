@@ -15,6 +15,7 @@ way it is turned: where a foot hangs beside a face, the single contact of the tw
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -78,45 +79,45 @@ class Shape(Prop):
     height: float = param(0.036, "m", 0.015, 0.08)
     friction: float = param(0.7, "1", 0.05, 1.5)
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """Distance of the outline's corners from the axis [m]."""
         if self.kind == CYLINDER:
             return self.width / 2
         return self.width / 1.5 if self.kind == TRIANGLE else self.width / 2 / math.cos(math.pi / SIDES[self.kind])
 
-    @property
+    @cached_property
     def pointed(self) -> bool:
         """Whether it is a frustum that ends in a tip, on which no shape can stand."""
         return self.kind == FRUSTUM and self.top < 2 * TIP_RADIUS
 
-    @property
+    @cached_property
     def collar(self) -> float:
         """Height of a frustum's collar [m]."""
         return max(MIN_COLLAR, self.height - math.tan(CONE_SLOPE) * (self.width / 2 - TIP_RADIUS))
 
-    @property
+    @cached_property
     def top(self) -> float:
         """Radius of a frustum's upper face, measured to its sides [m]."""
         return self.width / 2 - (self.height - self.collar) / math.tan(CONE_SLOPE)
 
-    @property
+    @cached_property
     def between(self) -> float:
         """Middle of a jaw that closes on a side, along the normal of that side [m]."""
         return (self.width - 2 * self.reach) / 2 if self.kind == TRIANGLE else 0.0
 
-    @property
+    @cached_property
     def sides(self) -> NDArray[np.float64]:
         """Directions of the sides' normals [rad]."""
         return 2 * math.pi * np.arange(SIDES[self.kind]) / SIDES[self.kind]
 
-    @property
+    @cached_property
     def rays(self) -> NDArray[np.float64]:
         """Directions of the corners, shape (sides, 2)."""
         angles = 2 * math.pi * (np.arange(SIDES[self.kind]) + 0.5) / SIDES[self.kind]
         return np.column_stack([np.cos(angles), np.sin(angles)])
 
-    @property
+    @cached_property
     def corners(self) -> NDArray[np.float64]:
         """Corners of the solid, shape (n, 3) [m]."""
         levels = [(FOOT_PROTRUSION, self.reach), (self.height, self.reach)]

@@ -19,6 +19,7 @@ window and hits the second plate. In a channel the walls would align a bar, as t
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -76,7 +77,7 @@ class SlotBoard(Prop):
     """Whether the slot is filled: the same board without a passage."""
     rgba: Rgba = (0.48, 0.52, 0.60, 1.0)
 
-    @property
+    @cached_property
     def top(self) -> float:
         """Height of the upper face above the ground [m]."""
         return self.centre + self.slot / 2 + self.roof

@@ -1,6 +1,7 @@
 """A shelf with one slot: two upright dividers on a base, chamfered at the mouth. The ends may be closed."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -41,17 +42,17 @@ class SlotShelf(Prop):
     """Sliding friction of the polished surface. Only this friction counts, so that things do not jam in the slot."""
     rgba: Rgba = (0.55, 0.42, 0.30, 1.0)
 
-    @property
+    @cached_property
     def width(self) -> float:
         """Width along x [m]."""
         return self.gap + 2 * self.divider
 
-    @property
+    @cached_property
     def top(self) -> float:
         """Height of the dividers' upper edges above the ground [m]."""
         return self.base + self.height
 
-    @property
+    @cached_property
     def long(self) -> float:
         """Length along y, closed ends included [m]."""
         return self.length + 2 * self.ends

@@ -21,6 +21,7 @@ import abc
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -59,7 +60,7 @@ class Section:
     leaky: bool = False
     """Whether no suction cup can hold the surface."""
 
-    @property
+    @cached_property
     def reaches_axis(self) -> bool:
         return min(radius for radius, _ in self.corners) == 0.0
 
@@ -116,7 +117,7 @@ class Turned(Prop):
         volume, centre, inertia = self.round_body()
         return centre, self.mass / volume * inertia
 
-    @property
+    @cached_property
     def tipping_angle(self) -> float:
         """Tilt at which the centre of mass passes over the nearest edge of the underside [rad]."""
         com, _ = self.inertial()

@@ -10,6 +10,7 @@ in a folder, and `Ycb.scans` replaces the proxy by it.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import mujoco
@@ -109,7 +110,7 @@ class Item:
     scanned: bool
     """Whether its dimensions were measured on the scan."""
 
-    @property
+    @cached_property
     def folder(self) -> str:
         """Name of the object's folder in the set."""
         return f"{self.number:03d}_{self.name.replace(' ', '_')}"
@@ -207,12 +208,12 @@ class Ycb(Prop):
     scans: Mapping[str, Scan] = field(default_factory=dict, compare=False, repr=False)
     """Solids made of scans, by `called`. If there are any, no proxy is used."""
 
-    @property
+    @cached_property
     def called(self) -> str:
         """Key of the object in `scans`: its folder in the set, with `/low` for a lying carton."""
         return f"{self.row.folder}/low" if self.lies else self.row.folder
 
-    @property
+    @cached_property
     def scan(self) -> Scan | None:
         """Scan that replaces the proxy, or None.
 
@@ -224,18 +225,18 @@ class Ycb(Prop):
             raise BadConfig(f"there is no scan of {self.called}; known: {known}; name a folder with its scan in ycb=")
         return self.scans.get(self.called)
 
-    @property
+    @cached_property
     def row(self) -> Item:
         """Entry of the object in `ITEMS`."""
         return ITEMS[self.item]
 
-    @property
+    @cached_property
     def lies(self) -> bool:
         """Whether it is a carton that lies on its narrow side."""
         prop = self.row.prop
         return bool(self.low) and isinstance(prop, Carton) and prop.height > prop.width
 
-    @property
+    @cached_property
     def prop(self) -> Prop:
         """Proxy of the object, standing or lying."""
         prop = self.row.prop
@@ -243,12 +244,12 @@ class Ycb(Prop):
             return replace(prop, width=prop.height, height=prop.width)
         return prop
 
-    @property
+    @cached_property
     def features(self) -> dict[str, float]:
         """Features for scenarios: `scanned` if a scan replaces the proxy, else none."""
         return {"scanned": 1.0} if self.scan else {}
 
-    @property
+    @cached_property
     def mass(self) -> float:
         """Mass [kg]."""
         return float(self.spec().compile().body_mass.sum())

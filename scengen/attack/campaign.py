@@ -15,19 +15,18 @@ from ..pool.names import Name
 from ..samplers.task import Task
 from ..scenario import Answer, Plan, Scenario
 from ..sim.world import World
-from ..validate.certify import lower_bound
 from ..validate.identity import source_sha256
 from ..validate.playable import scene_errors
 from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
-from ..validate.settings import FEWEST
+from ..validate.settings import FEWEST, lower_bound
 from ..validate.verify.claims import alike
 from ..work.fingerprint import fingerprint
 from ..work.limits import at_least
 from ..work.log import Log
 from ..work.parallel import Limits, Workers, each
 from ..work.plain import read_plain, why_not_plain
-from ..work.targets import write
+from ..work.targets import move_aside, write
 from .adversary import LEAKS, PRIOR, RANDOM, RATED, TIERS, Attack, AttackResult, UntriedShortcut, never
 from .evidence import Hit, TierRate, rates, replayed
 from .experience import Experience, experience, feasible
@@ -39,6 +38,8 @@ MAX_HIT = 100_000_000
 """Size of the largest file of a hit that is read [bytes]: an hour of two arms has 20 MB."""
 GRAMMAR = 7
 """Version of macros and tiers: reports of different versions are not comparable."""
+LOG = "attack.jsonl"
+"""Name of the log in the folder of an attack."""
 HITS_FOLDER = "hits"
 """Folder of the hits in a pool."""
 DRAWS_PER_SCENARIO = 4
@@ -75,6 +76,7 @@ class AttackSettings:
     limit_mb: int = 4000
     to: str | None = None
     json: str | None = None
+    fresh: bool = False
 
     @property
     def requested(self) -> Sequence[str] | None:
@@ -245,7 +247,9 @@ def attack(
         "rules": settings.rules,
         "source_sha256": source_sha256(task.family),
     }
-    with Log(folder / "attack.jsonl", identity) as log:
+    if settings.fresh and begun(folder):
+        move_aside(folder)
+    with Log(folder / LOG, identity, "give fresh=true to move them aside, or choose another to=") as log:
         done = {record["scenario"] for record in log.records}
         todo = [k for k, one in enumerate(subjects) if one.scenario.id not in done]
         limits = Limits(settings.limit_seconds, settings.limit_mb)
@@ -259,6 +263,11 @@ def attack(
         order = [one.scenario.id for one in subjects]
         log.sort(lambda record: order.index(record["scenario"]))
         return _report(task, rules, subjects, log, folder, priors)
+
+
+def begun(folder: Path) -> int:
+    """Number of scenarios that earlier attacks into a folder have finished, those of a refused identity included."""
+    return max(0, len((folder / LOG).read_bytes().splitlines()) - 1) if (folder / LOG).is_file() else 0
 
 
 def check_budget(setting: str, budget: int, scenarios: int) -> None:

@@ -32,10 +32,9 @@ from ..samplers.split import ID as TRAINING
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..sim.world import World
-from ..validate.certify import lower_bound
 from ..validate.rebuilt import world_of
 from ..validate.rollout import Jitter, replay, run
-from ..validate.settings import Robust
+from ..validate.settings import Robust, lower_bound
 from ..validate.verify.claims import passed_filter
 from ..work.machine import memory_bounded
 from ..work.plain import open_plain
@@ -50,7 +49,7 @@ passes with a probability of 13 %."""
 
 
 RESUMED = " from a state of the witness on"
-"""Remark about a filtered hit that `Hit.resumed` tells of."""
+"""Remark about a filtered hit that is `Hit.resumed`."""
 
 
 def spelled(raw: bool) -> str:
@@ -214,9 +213,12 @@ def scenario_of(hit: Hit, task: Task) -> Scenario:
     """The scenario of a hit, under its conditions.
 
     Raises:
-        ScengenError: the parameters, or the conditions, are not those of the task.
+        ScengenError: the parameters are not those of the task, or there are no such conditions.
     """
-    return task.scenario(hit.params, hit.conditions or TRAINING)
+    try:
+        return task.scenario(hit.params, hit.conditions or TRAINING)
+    except BadConfig as error:
+        raise BadConfig(f"{hit.name}: {error}; give a hit that scengen attack has stored") from None
 
 
 def replayed(hit: Hit, task: Task) -> Replayed:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scenario import Answer, Scenario
-from ..validate.certify import lower_bound
+from ..validate.settings import lower_bound
 from .macros import Macro
 from .player import Attempt
 

@@ -1,6 +1,7 @@
 """Processor time of certificates, by task and check: `scengen bench certify=true`."""
 
 import time
+from collections.abc import Mapping
 
 from rich.table import Table
 
@@ -12,22 +13,32 @@ from ..samplers.task import Task
 from ..validate.certify import Trial
 from ..validate.settings import QUICK
 
-NEGLIGIBLE_COST = 0.05
-"""Processor time below which a check is left out of the cost of a certificate [s]."""
+SMALL_SHARE = 0.04
+"""Share of a certificate's cost below which a check is not named in the table."""
 
 
 def certificates() -> tuple[Table, dict[str, dict[str, float]]]:
     """Processor time of a quick certificate of every task's first training scenario, by check [s]."""
     costs = {name: _certificate(compose.load_task(name)) for name in task_files.tasks()}
-    named = [check for check in CHECKS if any(check in cost for cost in costs.values())]
-    table = Table("task", *named, "all", title="processor time of a certificate (s)", title_justify="left")
-    for name, cost in costs.items():
-        cells = (f"{cost[check]:.1f}" if check in cost else "" for check in named)
-        table.add_row(name, *cells, f"{sum(cost.values()):.1f}")
-    totals = [sum(cost.get(check, 0.0) for cost in costs.values()) for check in named]
-    table.add_section()
-    table.add_row("all", *(f"{total:.1f}" for total in totals), f"{sum(totals):.1f}")
-    return table, costs
+    return cost_table(costs), costs
+
+
+def cost_table(costs: Mapping[str, Mapping[str, float]]) -> Table:
+    """Processor time of certificates [s], times that of the oracle's rollout, and the checks that take most of it.
+
+    Args:
+        costs: processor time by task and check [s].
+    """
+    title = "processor time of a certificate (s), and over that of the oracle's rollout"
+    table = Table("task", "all", "times", "checks", title=title, title_justify="left")
+    totals = {check: sum(cost.get(check, 0.0) for cost in costs.values()) for check in CHECKS}
+    for name, cost in {**costs, "all tasks": totals}.items():
+        whole = sum(cost.values())
+        most = sorted((check for check in cost if cost[check] >= SMALL_SHARE * whole), key=cost.__getitem__)
+        times = f"{whole / cost['solved']:.1f}" if cost.get("solved") else ""
+        told = ", ".join(f"{check} {cost[check]:.1f}" for check in reversed(most))
+        table.add_row(name, f"{whole:.1f}", times, told, end_section=name == [*costs][-1])
+    return table
 
 
 def _certificate(task: Task) -> dict[str, float]:
@@ -40,4 +51,4 @@ def _certificate(task: Task) -> dict[str, float]:
         cost[name] = time.process_time() - begin
         if check.passed is False:
             break
-    return {name: seconds for name, seconds in cost.items() if seconds >= NEGLIGIBLE_COST}
+    return cost

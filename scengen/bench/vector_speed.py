@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import AsyncVectorEnv, VectorEnv
@@ -27,7 +28,7 @@ def vector_ratios(folder: str, row: PoolRow, repeats: int) -> dict[str, Measure]
         folder: pool with the scenario of `row` alone.
     """
     task, actions = row.task, row.witness[:PERIODS]
-    seen = {"observations": PROPRIOCEPTION}
+    seen: dict[str, Any] = {"observations": PROPRIOCEPTION}
     processes = AsyncVectorEnv(
         [lambda: PoolEnv(task, folder, **seen)] * SLOTS
     )  # before any thread: it copies this process

@@ -6,6 +6,7 @@ import re
 import signal
 import sys
 import tempfile
+import textwrap
 import threading
 import traceback
 import warnings
@@ -16,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from ..errors import BadConfig, ForeignCode, ScengenError, cut, nearest
+from ..errors import BadConfig, ForeignCode, ScengenError, cut, nearest, place_of
 from .verbs import COMMANDS, CONTINUING, FORMS, GROUPS, ONLY_FORMS, RENAMED, VERBS, file_stem, parsed
 
 OK = 0
@@ -142,8 +143,6 @@ def _interrupted(argv: Sequence[str]) -> int:
 
 def _status_of(error: Exception) -> int:
     """Print an error in one line. Returns the exit status."""
-    from ..work.foreign import place_of
-
     place = place_of(error)
     if isinstance(error, ForeignCode):
         return _failed(str(error), _write_traceback(error))
@@ -211,6 +210,10 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     flags = [a for a in arguments if a.startswith("-")]
     if flags and flags[0].partition("=")[0] in SHOW_OPTIONS:
         return _show(verb, arguments)
+    if flags and flags[0].partition("=")[0] in ("--config-dir", "-cd", "--config-path", "-cp"):
+        raise BadConfig(
+            f"{flags[0]} is not an option of scengen; give hydra.searchpath=FOLDER, which is searched as well"
+        )
     if flags:
         known = "settings are key=value, options --help, --cfg job and --info " + "|".join(ORIGINS)
         raise BadConfig(f"{cut(repr(flags[0]))} is not an option; {known}; see scengen {verb} --help")
@@ -250,16 +253,22 @@ def _show(verb: str, arguments: Sequence[str]) -> int:
     words = list(arguments)
     place = next(i for i, word in enumerate(words) if word.startswith("-"))
     option, _, what = words.pop(place).partition("=")
-    if not what and place < len(words):
+    if not what and place < len(words) and "=" not in words[place]:
         what = words.pop(place)
+    words = [word for word in words if word != "--resolve"]  # what is printed is resolved
     if others := [word for word in words if word.startswith("-")]:
         raise BadConfig(f"{cut(repr(others[0]))} cannot be combined with {option}; give one of them")
     if SHOW_OPTIONS[option] == "--info":
         compose.print_origin(verb, words, what)
     elif what == "job":
         out.print(compose.as_yaml(verb, words), end="", soft_wrap=True)
+    elif what in ("hydra", "all"):
+        job = compose.as_yaml(verb, words) if what == "all" else ""
+        out.print(job + compose.hydra_yaml(verb, words), end="", soft_wrap=True)
     else:
-        raise BadConfig(f"{option} {cut(repr(what))}; expected --cfg job, the configuration of the command")
+        raise BadConfig(
+            f"{option} {cut(repr(what))}; expected --cfg job, the configuration of the command, hydra or all"
+        )
     return OK
 
 
@@ -322,18 +331,30 @@ def _write_traceback(error: BaseException) -> str:
 
 def _help() -> str:
     """The commands by purpose, each with the docstring of its module and its forms."""
+    from .usage import columns
+
+    room = columns()
+
+    def about(verb: str) -> str:
+        start = f"  {verb:<{NAMES - 3}} "
+        hang = " " * NAMES
+        return textwrap.fill(_purpose(verb), room, initial_indent=start, subsequent_indent=hang)
+
     lines = ["scengen: physical puzzles for robot manipulation, each verified to be solvable", ""]
-    lines += ["usage: scengen COMMAND [key=value ...]      settings of a command: scengen help COMMAND", ""]
+    lines += ["usage: scengen COMMAND [key=value ...]", "settings of a command: scengen help COMMAND", ""]
     for purpose, verbs in GROUPS.items():
         lines.append(f"{purpose}:")
         for verb in verbs:
-            if verb not in ONLY_FORMS:
-                lines.append(f"  {verb:<18}{_purpose(verb)}")
-            lines += [f"  {verb} {form:<{17 - len(verb)}}{_purpose(f'{verb} {form}')}" for form in FORMS.get(verb, ())]
+            forms = [f"{verb} {form}" for form in FORMS.get(verb, ())]
+            lines += map(about, forms if verb in ONLY_FORMS else [verb, *forms])
         lines.append("")
-    lines.append("example: scengen generate task=domino_single split=low_starter n=20 workers=2 pool=generated/low")
+    lines.append("example: scengen generate task=domino_single split=low_starter n=20")
     lines.append('completion in bash: eval "$(scengen --completion bash)"')
     return "\n".join(lines)
+
+
+NAMES = 23
+"""Width of the column of commands in the help [characters]."""
 
 
 def _purpose(verb: str) -> str:

@@ -18,6 +18,7 @@ from ..samplers.axis import Axis, spell
 from ..samplers.dists import Fixed
 from ..samplers.task import ID, Task
 from ..samplers.task_files import About
+from .certificates import certificate_table
 
 LINES = 1000
 """Largest number of scenarios in a table of a pool; id= finds the others."""
@@ -35,8 +36,13 @@ def funnel_table(funnel: Mapping[str, int], reasons: Mapping[str, int]) -> Table
     if reasons:
         table.add_section()
         for reason, count in sorted(reasons.items(), key=lambda item: -item[1])[:8]:
-            table.add_row(reason[:90], "", str(count), "", style="dim")
+            table.add_row(in_words(reason), "", str(count), "", style="dim")
     return table
+
+
+def in_words(reason: str) -> str:
+    """A reason of the rejection report, in which `#` stands for numbers that differ, as people read it."""
+    return reason.replace("# of #", "too few").replace("#", "N")
 
 
 def summary_lines(summary: Summary) -> list[str]:
@@ -97,6 +103,8 @@ def pools_table(pools: Sequence[Pool]) -> Table:
 def scenario_tables(row: PoolRow) -> list[Table]:
     """Tables of one scenario: its identity, its parameters and its certificate."""
     about = Table(title=str(row.name), title_justify="left", show_header=False)
+    about.add_column("", no_wrap=True)
+    about.add_column("")
     for name in ("instruction", "split", "seed", "index", "attempt", "id_twin", "embodiment", "scene_sha256"):
         about.add_row(name, str(getattr(row, name)))
     about.add_row("shifted", _numbers(row.shifted))
@@ -104,12 +112,7 @@ def scenario_tables(row: PoolRow) -> list[Table]:
     params = Table("parameter", "value", title="parameters", title_justify="left")
     for name, value in row.params.items():
         params.add_row(name, f"{value:g}")
-    title = f"certificate: {row.certificate.verdict} ({row.certificate.settings})"
-    checks = Table("check", "passed", "numbers", title=title, title_justify="left")
-    for check in row.certificate.checks:
-        mark = {True: "yes", False: "NO", None: "nothing to check" if check.waived else "skipped"}[check.passed]
-        checks.add_row(check.name, mark, check.reason or _numbers(check.numbers))
-    return [about, params, checks]
+    return [about, params, certificate_table(row)]
 
 
 def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Evidence]]) -> Table:

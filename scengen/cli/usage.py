@@ -1,6 +1,8 @@
 """Text of `scengen COMMAND --help`: the file of the command, and the settings that it does not list."""
 
 import re
+import shutil
+import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -11,6 +13,8 @@ from ..samplers import task_files
 
 WIDTH = 118
 """Largest length of a line [characters]."""
+INDENT = 4
+"""Indentation of a comment that stands below its setting [characters]."""
 
 
 def usage(verb: str, overrides: Sequence[str]) -> str:
@@ -23,9 +27,35 @@ def usage(verb: str, overrides: Sequence[str]) -> str:
         ScengenError: the chosen task does not exist.
     """
     text = task_files.command_file(verb).read_text()
-    own = "".join(line for line in text.splitlines(keepends=True) if not _for_hydra(line))
+    own = [line for line in text.splitlines() if not _for_hydra(line)]
     takes_pool = bool(re.search("^(pool|hits|replay):", text, re.M))
-    return own + "".join(f"{line}\n" for line in _more(verb, task_files.groups(verb), takes_pool, overrides))
+    lines = [*own, *_more(verb, task_files.groups(verb), takes_pool, overrides)]
+    room = columns()
+    return "".join(f"{part}\n" for line in lines for part in folded(line, room))
+
+
+def columns() -> int:
+    """Width of the terminal, or of COLUMNS, at most `WIDTH` [characters]."""
+    return min(shutil.get_terminal_size((WIDTH, 24)).columns, WIDTH)
+
+
+def folded(line: str, room: int) -> Iterator[str]:
+    """A line of a help in lines of at most `room` characters; its comment goes below its setting if it must.
+
+    Words, such as commands, stay whole.
+    """
+    setting, mark, comment = line.partition("# ")
+    if len(line) <= room or not mark:
+        yield line
+        return
+    if len(setting) > room // 2:
+        yield setting.rstrip()
+        setting = " " * INDENT
+    first, next_ = f"{setting}# ", "#" + " " * INDENT if not setting else " " * len(setting) + "# "
+    wide = max(room, len(first) + 20)
+    yield from textwrap.wrap(
+        comment, wide, initial_indent=first, subsequent_indent=next_, break_long_words=False, break_on_hyphens=False
+    )
 
 
 def _for_hydra(line: str) -> bool:
@@ -42,9 +72,14 @@ def _more(verb: str, groups: Sequence[str], takes_pool: bool, overrides: Sequenc
     search = task_files.search_path(overrides)
     if "task" in groups:
         yield ""
-        yield "# task=NAME, and its splits: id (training) and its axes"
-        for name in _tasks(overrides, search):
-            yield from _wrapped(f"#   {name:<20}", task_files.splits(name, search))
+        names = _tasks(overrides, search)
+        if len(names) == 1:
+            yield from _wrapped(
+                f"# splits of task={names[0]}: id (training) and its axes:", task_files.splits(names[0], search)
+            )
+        else:
+            yield from _wrapped("# task=NAME, one of:", names)
+            yield f"# splits of a task   scengen tasks task=NAME, or scengen {verb} task=NAME --help"
         if verb == "generate":
             yield "# task=all          all tasks; also a category (task=P3), or a list (task=P3,packing)"
         yield "# task.*           any value in the file of the task, as in task.horizon=20 or task.id.x=[uniform,0,0.1]"
@@ -77,11 +112,11 @@ def _flat(node: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _wrapped(start: str, words: Sequence[str]) -> Iterator[str]:
-    """Words in lines of at most `WIDTH` characters. The words of further lines are aligned with those of the first."""
+    """Words in lines of the width of the terminal. The words of further lines are indented."""
     line = start
     for word in words:
-        if len(line) + 1 + len(word) > WIDTH:
+        if len(line) + 1 + len(word) > columns():
             yield line
-            line = "#" + " " * (len(start) - 1)
+            line = "#" + " " * min(len(start) - 1, INDENT)
         line += f" {word}"
     yield line

@@ -7,9 +7,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .rules import Nonconformity, Rule, axis_checks, checks, frame_checks, search
+    from .rules import Nonconformity, Rule, at_sight, axis_checks, checks, frame_checks, search
 
-__all__ = ["Nonconformity", "Rule", "axis_checks", "checks", "frame_checks", "search"]
+__all__ = ["Nonconformity", "Rule", "at_sight", "axis_checks", "checks", "frame_checks", "search"]
 
 
 def __getattr__(name: str) -> Any:

@@ -18,7 +18,7 @@ from functools import cache, partial
 from pathlib import Path
 
 from .. import compose
-from ..errors import ScengenError
+from ..errors import Infeasible, ScengenError
 from ..ood import axis_card, axis_evidence, features
 from ..ood.baseline import BELIEF, INCONCLUSIVE
 from ..params import canonical, values, with_values
@@ -99,6 +99,27 @@ def checks(
         Rule("the family states its version", partial(_states_version, found, search(conf))),
         *of_splits,
     ]
+
+
+def at_sight(task: str, overrides: Sequence[str] = ()) -> list[str]:
+    """What `checks` refuses about a task before anything is simulated, from its first training scenario.
+
+    Args:
+        overrides: folders of other packages, and changes of the task.
+    """
+    found, said = compose.load_task(task, overrides), list[str]()
+    for rule in (
+        partial(_describes_axes, found),
+        partial(_states_version, found, task_files.search_path(overrides)),
+        partial(_scenes_have_controls, found, ID, 1, 0),
+    ):
+        try:
+            rule()
+        except Nonconformity as error:
+            said.append(str(error))
+        except Infeasible:
+            continue  # the draws' own error says more
+    return said
 
 
 def _readable_name(check: Callable[..., None]) -> str:

@@ -33,10 +33,15 @@ SCENE = np.dtype(
         ("warning_kinds", np.int64),
         ("ctrl", np.int64),
         ("substeps", np.int64),
+        ("iterations", np.int64),
+        ("islands", np.int64),
+        ("max_iterations", np.int64),
+        ("cut_short", np.int64),
     ]
 )
-"""Addresses of the structs and of their fields (`native.Layout`), and the number of physics steps in one control
-period."""
+"""Addresses of the structs and of their fields (`native.Layout`), the number of physics steps in one control period,
+the number of islands whose solver iterations are counted, and whether a solver has made all the iterations that it may
+make since the reset."""
 
 
 def _sources() -> str:
@@ -156,7 +161,15 @@ class Loop:
             self.data.qpos[fingers] = places
             osc.start(arm["state"], home, closed=self.holds and number == 0)
         self._latches[:] = 0
+        self._scene["max_iterations"], self._scene["cut_short"] = self.model.opt.iterations, 0
         mujoco.mj_forward(self.model, self.data)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the solver has ended by its tolerance in every physics step since the reset, so that more iterations
+        would have given the same bits. False if that is unknown, because there may be more islands than are counted."""
+        (scene,) = self._scene
+        return bool(not scene["cut_short"] and self.model.ntree <= scene["islands"])
 
     def step(self, action: ArrayLike) -> int:
         """Simulate one control period under an action of shape (size,).
@@ -254,6 +267,7 @@ def _fill_scene(scene: NDArray[np.void], model: mujoco.MjModel, data: mujoco.MjD
     """Write the addresses of one model and its data into a `SCENE` record."""
     scene["model"], scene["data"], scene["substeps"] = model._address, data._address, substeps
     scene["ctrl"] = data.ctrl.ctypes.data
+    scene["iterations"], scene["islands"] = data.solver_niter.ctypes.data, len(data.solver_niter)
     layout = native.layout()
     scene["ncon"], scene["contact"] = data._address + layout.ncon, data._address + layout.contact
     scene["stride"], scene["dist"], scene["geom"] = layout.stride, layout.dist, layout.geom
@@ -346,6 +360,8 @@ def _substep(
         if at.cup != osc.NONE:
             osc.suck(at, arms[i].state, _pads_in_contact(scene, tight, at.pad))
     native.step2(scene.model, scene.data)
+    if native.int32s(scene.iterations, scene.islands).max() >= scene.max_iterations:
+        scene.cut_short = 1
 
 
 @njit

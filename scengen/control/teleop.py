@@ -28,16 +28,15 @@ class Filter:
             arms: number of arms; an action holds seven numbers for each.
         """
         self._state = np.zeros(MOTION * arms)
-        self._input = np.zeros((MOTION + 1) * arms)
+        self._shape = ((MOTION + 1) * arms,)
 
     def __call__(self, action: ArrayLike) -> NDArray[np.float32]:
         """The filtered action, shape (7 * arms,), float32. Controller and witness get exactly this."""
-        given = np.asarray(action, np.float64)
-        if given.shape != self._input.shape:
-            raise ValueError(f"an action has shape {self._input.shape}, not {given.shape}")
-        self._input[:] = given
-        filtered = np.empty(len(self._input), np.float32)
-        if not _filter(self._state, self._input, filtered):
+        given = np.ascontiguousarray(action, np.float64)
+        if given.shape != self._shape:
+            raise ValueError(f"an action has shape {self._shape}, not {given.shape}")
+        filtered = np.empty(self._shape, np.float32)
+        if not _filter(self._state, given, filtered):
             raise ValueError(f"an action must be finite, not {given.tolist()}")
         return filtered
 
@@ -75,7 +74,7 @@ def check_filter(name: str | None) -> None:
 
 def unfiltered(action: ArrayLike) -> NDArray[np.float32]:
     """An action as the controller gets it without the filter: clipped to [-1, 1]."""
-    return np.clip(np.asarray(action, np.float32), -1.0, 1.0)
+    return np.asarray(action, np.float32).clip(-1.0, 1.0)
 
 
 @njit(nogil=True, cache=True)

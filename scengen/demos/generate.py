@@ -27,7 +27,7 @@ from ..pool.files import sha256
 from ..pool.manifest import PROCESS
 from ..pool.row import DemonstrationRow
 from ..runs.attempts import Progress, Wanted, extend, first_of, infeasible, rejection, reported_write_errors
-from ..runs.journal import Journal, Record
+from ..runs.journal import Journal, Record, start_over
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
 from ..validate.certify import Trial
@@ -71,6 +71,12 @@ class DemosSettings:
     limit: int | None = None
     limit_seconds: float = 600.0
     limit_mb: int = 4000
+    fresh: bool = False
+    json: str | None = None
+
+    def folder(self, task: Task) -> Path:
+        """Folder of the demonstrations."""
+        return Path(self.to or Path("generated", f"{task.name}-{Split.parse(self.split)}-demos"))
 
     def check(self, task: Task) -> None:
         """Raise `ScengenError` for a setting that makes no sense for this task."""
@@ -216,7 +222,7 @@ def generate_demonstrations(
     """
     settings.check(task)
     split = Split.parse(settings.split)
-    folder = Path(settings.to or Path("generated", f"{task.name}-{split}-demos"))
+    folder = settings.folder(task)
     pools = [Pool.open(each).check() for each in collection.folders(settings.apart or [])]
     pools = [pool for pool in pools if pool.task == task.name]
     config = DemonstrationConfig(
@@ -232,6 +238,8 @@ def generate_demonstrations(
     )
     job = Job(task, config, certify_settings, Others.of(pools))
     identity = {"config": asdict(config), "checks": asdict(certify_settings), **made_with(task)}
+    if settings.fresh:
+        start_over(folder, DEMONSTRATIONS, "to")
     journal = Journal(folder, identity, DEMONSTRATIONS, DemonstrationRow, "to")
     try:
         records = journal.records()

@@ -297,7 +297,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self.steps_in(max(pool.manifest.task_node["horizon"] for pool in self._rows.pools))
 
     def steps_in(self, seconds: float) -> int:
-        """Number of steps in a time [s], the last one begun."""
+        """Number of steps that a time takes [s], rounded up."""
         return int(np.ceil(seconds / (Loop.PERIOD * self.action_repeat) - 1e-9))
 
     def check_observations(self, names: Sequence[str]) -> None:

@@ -1,7 +1,6 @@
 """Streams of observations: the paper's streams under robosuite's names, each read only if it is requested.
 
-Three words stand for several streams: `state`, the default, for the robot's own pose and `object-state`; `pictures` for
-its own pose and all cameras; `proprioception` for its own pose alone.
+Words stand for several streams (`WORDS`): `state` is the default.
 
 Shapes, units and names follow the paper's table of modalities. Images are (height, width, 3), first row on top. The
 table is for one arm. A second arm has the same streams, with `robot1_` in place of `robot0_` or as a prefix. An arm
@@ -223,7 +222,13 @@ def proprioception(embodiment: str) -> tuple[str, ...]:
 ALL = "+".join([JAW] * MAX_ARMS)
 """Embodiment that has all streams and cameras."""
 
-STATE, PICTURES, PROPRIOCEPTION = WORDS = ("state", "pictures", "proprioception")
+STATE = "state"
+"""Word for the robot's own pose and `object-state`."""
+PICTURES = "pictures"
+"""Word for the robot's own pose and all cameras."""
+PROPRIOCEPTION = "proprioception"
+"""Word for the robot's own pose."""
+WORDS = (STATE, PICTURES, PROPRIOCEPTION)
 """Words for several streams."""
 
 

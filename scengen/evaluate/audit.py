@@ -154,6 +154,7 @@ class _Audit:
         self._tell((None, text) for text in self._other_run())
         for number, line in enumerate(self.lines):
             self._tell((number, text) for text in untrue(line, self._every, self.identity, self.told.name))
+        self._tell(self._misplaced())
         self._tell(self._crashed_with_actions())
         self._rebuild(progress)
         self._remarks()
@@ -295,10 +296,16 @@ class _Audit:
         if folder not in self._actions:
             found = Demonstrations.open(folder) if is_demonstrations(folder) else None
             rows = [] if found is None else [*found.attempts()]
-            if found is not None:
-                self._tell((None, f"{folder} {text}") for text in self._of_others(found, which))
             self._actions[folder] = {(row.index, row.run): row.witness for row in rows}
         return self._actions[folder]
+
+    def _misplaced(self) -> Iterator[Fault]:
+        """What folders of kept actions say otherwise than the run, whether their lines are rebuilt or not."""
+        folders = {kept_folder(self.folder, which): which for which in map(id_of, self.lines)}
+        for folder, which in sorted(folders.items()):
+            if is_demonstrations(folder):
+                found = self._of_others(Demonstrations.open(folder), which)
+                yield from ((None, f"{folder} {text}") for text in found)
 
     def _of_others(self, found: Demonstrations, which: RolloutId) -> Iterator[str]:
         """What a folder of kept actions says otherwise than the run."""
@@ -346,7 +353,8 @@ class _Audit:
         )
         if self.told.harness:
             report.claimed.append(f"that {cut(self.told.harness)} played no other episodes")
-        report.claimed.append("that the pools are sound (scengen verify pool=)")
+        kept = " and the kept rollouts" if self.of_run.keep else ""
+        report.claimed.append(f"that the pools{kept} are sound (scengen verify pool=)")
 
     @property
     def versions(self) -> bool:

@@ -128,7 +128,9 @@ class Edition:
         node = read_yaml("edition", path)
         if (given := node.get("format")) != FORMAT:
             given = cut(repr(given), 20)
-            raise BadConfig(f"{path} has format {given}; this version reads format {FORMAT}; install another one")
+            raise BadConfig(
+                f"{path} has format {given}; this version reads format {FORMAT}; install the scengen of the other"
+            )
         told = typed(str(path), EditionFile, node, exact=True)
         if told.level not in (levels := sorted(file.stem for file in (conf_dir() / "certify").glob("*.yaml"))):
             raise UnknownName(f"level of {path}", told.level, levels)

@@ -28,9 +28,9 @@ def latex(rows: Sequence[Row], category: Mapping[str, str]) -> str:
     grouped, of_tasks = _by_category(rates, policies, category), _by_task(rates, policies, category)
     every = ["task", "split", "condition", "policy", "n", "success"]
     tables = [
-        _table("Success in training by category [\\%]", ["policy", *groups, "all"], grouped),
-        _table("Success in and out of distribution [\\%]", ["task", *_twice(policies)], of_tasks),
-        _table("Success on every split and condition [\\%]", every, _every(rows)),
+        booktabs("Success in training by category [\\%]", ["policy", *groups, "all"], grouped),
+        booktabs("Success in and out of distribution [\\%]", ["task", *_twice(policies)], of_tasks),
+        booktabs("Success on every split and condition [\\%]", every, _every(rows)),
     ]
     return "% needs \\usepackage{booktabs}; intervals are 95 %\n" + "\n".join(tables)
 
@@ -42,7 +42,7 @@ def _by_category(rates: Rates, policies: Sequence[str], category: Mapping[str, s
     keys = [members[name][0] if len(members[name]) == 1 else name for name in names]
     whole = keys[0] if len(keys) == 1 else "all"
     for policy in policies:
-        yield [policy, *(_cell(rates.get((policy, key, ID, ""))) for key in (*keys, whole))]
+        yield [policy, *(cell(rates.get((policy, key, ID, ""))) for key in (*keys, whole))]
 
 
 def _by_task(rates: Rates, policies: Sequence[str], category: Mapping[str, str]) -> Iterator[list[str]]:
@@ -53,29 +53,29 @@ def _by_task(rates: Rates, policies: Sequence[str], category: Mapping[str, str])
             splits = [split for p, what, split, condition in rates if (p, what, condition) == (policy, task, "")]
             outside = [split for split in splits if split != ID]
             last = ALL_AXES if ALL_AXES in outside else outside[0] if outside else ""
-            found += [_cell(rates.get((policy, task, split, ""))) for split in (ID, last)]
+            found += [cell(rates.get((policy, task, split, ""))) for split in (ID, last)]
         yield found
 
 
 def _every(rows: Sequence[Row]) -> Iterator[list[str]]:
     for row in rows:
         task, split, condition, policy, n, *_ = row.cells()
-        yield [task, split, condition or "clean", policy, n.replace("x", "$\\times$"), _cell(row.rate)]
+        yield [task, split, condition or "clean", policy, n.replace("x", "$\\times$"), cell(row.rate)]
 
 
 def _twice(policies: Sequence[str]) -> list[str]:
     return [f"{policy}, {side}" for policy in policies for side in ("ID", "OOD")]
 
 
-def _cell(rate: Rate | None) -> str:
-    """A rate with its interval below the line, in percent."""
+def cell(rate: Rate | None) -> str:
+    """A rate with its interval below the line, in percent, as LaTeX."""
     if rate is None:
         return "--"
     value, low, high = (100 * each for each in (rate.value, rate.low, rate.high))
     return f"${value:.1f}_{{[{low:.0f},\\,{high:.0f}]}}$"
 
 
-def _table(caption: str, head: Sequence[str], rows: Iterator[list[str]]) -> str:
+def booktabs(caption: str, head: Sequence[str], rows: Iterator[list[str]]) -> str:
     """A table; cells with a dollar sign are LaTeX already."""
     body = [" & ".join(cell if "$" in cell else _escaped(cell) for cell in row) + " \\\\" for row in rows]
     titles = " & ".join(map(_escaped, head)) + " \\\\"

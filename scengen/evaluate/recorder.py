@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..envs.gym import Observation, PoolEnv
-from ..errors import BadConfig
+from ..errors import BadConfig, cut
 from ..perturb.perturbation import Perturbation
 from ..pool import Pool, kinds
 from ..pool.files import sha256
@@ -31,6 +31,10 @@ from .rollouts import Evaluation, LineLog, crashed_record, identity
 from .scenarios import known
 from .settings import EvaluateSettings, RolloutId
 
+MAX_NAME = 200
+"""Length of the longest name of a program or a policy [characters]."""
+MAX_REASON = 1000
+"""Length of the longest reason in a line [characters]."""
 LEFT = "the episode was left before its end"
 """Entry `crashed` of a line about an episode that was not played to its end: it is in no rate."""
 
@@ -45,6 +49,13 @@ class Player:
     """Name of the policy."""
     version: str | None = None
     """Version of the policy; episodes of another version are refused."""
+
+    def check(self) -> None:
+        """Raise `BadConfig` if a name is not a short text of one line."""
+        for name, given in vars(self).items():
+            good = isinstance(given, str) and 0 < len(given) <= MAX_NAME and given.isprintable()
+            if not good and (name, given) != ("version", None):
+                raise BadConfig(f"{name} = {cut(repr(given))}; give one line of 1 to {MAX_NAME} characters")
 
 
 class Recorder:
@@ -65,13 +76,11 @@ class Recorder:
         Raises:
             ScengenError: the folder is something else, or holds episodes of other settings.
         """
+        player.check()
         self.settings = settings_of(Path(to), player, env)
         self.settings.check()
         kinds.check_target(self.settings.folder, kinds.EPISODES)
         try_folder(self.settings.folder)
-        if replaces:
-            for name in (kinds.EPISODES, RUN):
-                (self.settings.folder / name).unlink(missing_ok=True)
         pools = [Pool.open(folder).check() for folder in self.settings.folders]
         about = {key: told for pool in pools for key, told in known(pool, search).items()}
         self._folder_of = {id_: folder for folder, id_ in about}
@@ -80,7 +89,8 @@ class Recorder:
         code = sha256(f"{player.harness} {player.policy} {player.version}")
         depends = {**identity(self.settings, pools), "task_versions": task_versions}
         depends |= {"code": dict.fromkeys(task_versions, code), "observed": dict.fromkeys(task_versions, observed)}
-        self._log = Log(self.settings.folder / kinds.EPISODES, depends, head=self.settings.folder / RUN)
+        folder = self.settings.folder
+        self._log = Log(folder / kinds.EPISODES, depends, head=folder / RUN, replaces=replaces)
         self._log.__enter__()
         self._lines = LineLog(self.settings, about, self._log)
         self._open: dict[int, Rollout] = {}
@@ -94,7 +104,12 @@ class Recorder:
         Args:
             env: the environment, after its reset.
             seen: the first observation.
+
+        Raises:
+            BadConfig: the recorder is closed.
         """
+        if self._is_closed:
+            raise BadConfig(f"the recorder of {self.settings.folder} is closed; make another one")
         self._leave(env)
         perturbation, scenario = str(env.perturbation), env.row.id
         number = self._counts[scenario, perturbation]
@@ -108,12 +123,17 @@ class Recorder:
 
         Args:
             info: the last `info` of the environment, with `success`, `reason` and `lacks`.
+
+        Raises:
+            BadConfig: `info` is another one.
         """
+        if missing := {"success", "reason"} - info.keys():
+            raise BadConfig(f"info has no {min(missing)}; give the last one that the environment has returned")
         rollout = self._open.pop(id(env), None)
         if rollout is None:
             return
-        success = bool(info["success"])
-        rollout.end(success, "" if success else str(info["reason"]), lacks=str(info.get("lacks", "")))
+        success, reason = bool(info["success"]), cut(str(info["reason"]), MAX_REASON)
+        rollout.end(success, "" if success else reason, lacks=str(info.get("lacks", "")))
         self._lines.add(rollout.record)
 
     def discard(self) -> None:

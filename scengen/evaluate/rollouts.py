@@ -5,7 +5,7 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
@@ -23,7 +23,7 @@ from ..work.fingerprint import fingerprint
 from ..work.log import Log
 from ..work.machine import cores
 from ..work.parallel import each
-from ..work.targets import refused, try_folder
+from ..work.targets import move_aside, try_folder
 from .arms import BENIGN, automatic_arms
 from .lines import CHAIN, COLUMNS, FORMAT, RUN, chained, renewed, run_sha256
 from .player import PolicyPlayer, Spent, policy_seed
@@ -129,7 +129,7 @@ def opened(
         task_versions = {a["task"]: a["task_version"] for a in about.values()}
         described = player.described({*task_versions})
         if settings.fresh:
-            _move_aside(path)
+            move_aside(path, path.with_name(RUN))
         whole = {**depends, "task_versions": task_versions, **described}
         with Log(path, whole, remedy, settings.folder / RUN) as log:
             yield Run(settings, about, log, player, keep, progress)
@@ -312,20 +312,3 @@ def _for_workers(player: PolicyPlayer) -> PolicyPlayer:
     fresh = [str(Path(folder).resolve()) for folder in settings.benign]
     changed = replace(settings, pool=folders, benign=fresh, client=client, workers=1)
     return PolicyPlayer(changed, player.search, player.strict, threads)
-
-
-def _move_aside(path: Path) -> None:
-    """Rename the file of episodes of earlier runs; nothing is deleted."""
-    if not path.exists():
-        return
-    free = next(k for k in itertools.count(1) if not _numbered(path, k).exists())
-    try:
-        path.rename(_numbered(path, free))
-        with suppress(FileNotFoundError):
-            path.with_name(RUN).rename(_numbered(path.with_name(RUN), free))
-    except OSError as error:
-        raise refused(path, error) from None
-
-
-def _numbered(path: Path, number: int) -> Path:
-    return path.with_name(f"{path.stem}-{number}{path.suffix}")

@@ -323,7 +323,9 @@ class Recording:
                 with memory_bounded(READING_MEMORY):
                     return file.read(use_threads=False)
         except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
-            raise PoolError(f"{path} cannot be read ({' '.join(str(error).split())[:120]}); restore it") from None
+            raise PoolError(
+                f"{path} cannot be read ({' '.join(str(error).split())[:120]}); restore it, or record it again"
+            ) from None
 
     def _read_json(self, name: str) -> dict[str, Any]:
         try:

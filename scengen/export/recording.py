@@ -252,7 +252,7 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
 
 
 def _source(settings: RecordSettings, pools: Sequence[str], task_versions: Mapping[str, int]) -> dict[str, Any]:
-    """Everything on which a recording depends, as it tells it.
+    """Everything on which a recording depends, as plain data.
 
     Args:
         pools: hashes of the pools.
@@ -276,7 +276,7 @@ def _again(settings: RecordSettings, source: Mapping[str, Any]) -> RecordSummary
     else:
         stored = Recording(Path(settings.to)).source if Path(settings.to, kinds.RECORDING).is_file() else {}
     if names := different({name: stored.get(name) for name in source}, json.loads(json.dumps(source))):
-        why = "has other " + ", ".join(names) if stored else "is no recording"
+        why = "has other " + ", ".join(names) if stored else "is not a recording"
         raise BadConfig(f"{settings.to} exists already and {why}; delete it, or give another name")
     return typed("summary", RecordSummary, {**stored["summary"], "earlier": True}, exact=True)
 

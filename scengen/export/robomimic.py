@@ -161,12 +161,12 @@ class Demonstrations:
 
 
 def stored_source(path: Path) -> dict[str, Any]:
-    """What a file says of its origin, see `Demonstrations.finish`; nothing if it is no file of scengen."""
+    """What a file says of its origin, see `Demonstrations.finish`; nothing if scengen has not written it."""
     import h5py
 
     try:
         with h5py.File(path, "r") as file:
-            found = json.loads(file["data"].attrs["scengen"])
+            found = json.loads(str(file["data"].attrs["scengen"]))
     except (OSError, KeyError, ValueError, TypeError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}

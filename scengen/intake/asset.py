@@ -4,7 +4,7 @@ import hashlib
 import importlib.metadata
 import json
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NoReturn
@@ -20,6 +20,7 @@ from ..geometry import Mat3
 from ..sim.scene_text import emit
 from ..work.parallel import Limits, each
 from ..work.plain import read_plain
+from .colours import colours_of, painted
 from .feet import MAX_LEAN, feet
 from .pieces import Pieces, Surface, cut_up, one_hull
 from .polygons import Indices
@@ -27,7 +28,7 @@ from .solid import UNITS, UPRIGHT, MeshSolid, as_mesh, content, read
 
 CUTTING_LIMITS = Limits(600.0, 8000)
 """Limits on making an asset. A scan with 16 000 triangles takes some 10 s and 300 MB."""
-REVISION = "2"
+REVISION = "3"
 """Revision of this package: assets of an earlier one may differ although all versions are the same."""
 DEFAULT_DENSITY = 1000.0
 """Density if neither mass nor density is given [kg/m^3]: that of water."""
@@ -188,6 +189,7 @@ class MeshAsset:
             "centre_of_mass": self.prop.com.tolist(),
             "inertia": self.prop.inertia.tolist(),
             "pieces": len(self.pieces.hulls),
+            "colours": len(self.prop.palette),
             "feet": len(self.prop.feet),
             "error": asdict(self.pieces.error),
             "error_of_one_hull": asdict(self.hull.error),
@@ -233,7 +235,12 @@ def _make_asset(request: IntakeRequest) -> MeshAsset:
     near = hull.error.worst <= request.error
     pieces = hull if near else cut_up(found, surface, request.error, request.pieces, request.seed)
     visual = _visual(found)
-    asset = MeshAsset(request, found, pieces, hull, visual, _prop(request, found, pieces, visual))
+    prop = _prop(request, found, pieces, visual)
+    if colours := colours_of(request.mesh, request.units, found.up, request.seed):
+        vertices, faces, palette, chosen = painted(*visual, colours, request.seed)
+        origin = visual[0][0] - prop.vertices[0]
+        prop = replace(prop, vertices=vertices - origin, faces=faces, palette=palette, painted=chosen)
+    asset = MeshAsset(request, found, pieces, hull, visual, prop)
     asset.figures()  # the drop and the MJCF are kept in the asset
     return asset
 

@@ -32,6 +32,8 @@ BATCH = 256
 """Rows per step of the optimiser."""
 FIRST_RATE = 1e-3
 """Learning rate of Adam in the first epoch. It falls to 0 along half a cosine."""
+BEST = "best_"
+"""Prefix of the weights of the best epoch in the file of an unfinished training."""
 INTERRUPTED = "Training interrupted by user"
 """Beginning of the warning of scikit-learn about Ctrl-C."""
 DECAY = 1e-4
@@ -52,6 +54,7 @@ class Training:
         epochs: int,
         limit: float | None,
         seed: int,
+        patience: int | None = None,
     ):
         """Begin, or continue from a file.
 
@@ -65,6 +68,8 @@ class Training:
             epochs: number of epochs.
             limit: processor time after which the training ends [s]; None for none.
             seed: seed of all random numbers.
+            patience: number of epochs without a lower held-out loss after which the training ends, with the weights of
+                the best epoch; None to train to the end.
 
         Raises:
             Broken: the file is damaged.
@@ -72,8 +77,10 @@ class Training:
         self.path, self.kind, self.hidden, self.learned = path, kind, hidden, learned
         self.members = members
         self._measured = learned.some(), held_out.some()
-        self.epochs, self._limit, self._seed = epochs, limit, seed
+        self.epochs, self._limit, self._seed, self._patience = epochs, limit, seed, patience
         self.arrays: dict[str, NDArray[np.float32]] = {}
+        self.best: dict[str, NDArray[np.float32]] = {}
+        """Weights after the epoch with the lowest held-out loss; none without patience."""
         self.losses: list[tuple[float, float]] = []
         """Losses after each epoch [variances]: of what is learned, and of what is held out."""
         self.seconds = 0.0
@@ -87,6 +94,22 @@ class Training:
         timed = self.seconds / self._limit if self._limit else 0.0
         return max(len(self.losses) / self.epochs, timed)
 
+    @property
+    def best_epoch(self) -> int:
+        """Number of the epoch with the lowest held-out loss, from 1; 0 before the first."""
+        return 1 + int(np.argmin([held_out for _, held_out in self.losses])) if self.losses else 0
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing is left to do."""
+        waited = len(self.losses) - self.best_epoch
+        return self.share >= 1.0 or (self._patience is not None and waited >= self._patience)
+
+    @property
+    def kept(self) -> dict[str, NDArray[np.float32]]:
+        """Weights of the policy."""
+        return self.best if self._patience is not None else self.arrays
+
     def advance(self) -> None:
         """Train for one epoch and keep the result."""
         started = time.process_time()
@@ -98,9 +121,12 @@ class Training:
         learned, held_out = (samples.error(self.kind, self.arrays) for samples in self._measured)
         self.losses.append((learned, held_out))
         self.seconds += time.process_time() - started
+        if self._patience is not None and self.best_epoch == len(self.losses):
+            self.best = self.arrays
         if self.kind != KNN:
+            best = {f"{BEST}{name}": values for name, values in self.best.items()}
             values = {"losses": self._all_losses(), "seconds": np.array([self.seconds], np.float32)}
-            write(self.path, arrays_as_bytes({**self.arrays, **values}))
+            write(self.path, arrays_as_bytes({**self.arrays, **best, **values}))
 
     def _all_losses(self) -> NDArray[np.float32]:
         """Losses of all epochs, shape (epochs, 2); -1 for those to come."""
@@ -112,7 +138,9 @@ class Training:
         shapes = network_shapes(
             self.kind, self.learned.inputs.shape[1], self.hidden, self.learned.chunks.shape[1], self.members
         )
-        arrays = read_arrays(self.path, {**shapes, "losses": (self.epochs, 2), "seconds": (1,)})
+        best = {f"{BEST}{name}": shape for name, shape in shapes.items()} if self._patience is not None else {}
+        arrays = read_arrays(self.path, {**shapes, **best, "losses": (self.epochs, 2), "seconds": (1,)})
+        self.best = {name.removeprefix(BEST): arrays.pop(name) for name in best}
         self.losses = [(float(a), float(b)) for a, b in arrays.pop("losses") if b >= 0.0]
         self.seconds = float(arrays.pop("seconds")[0])
         self.arrays = arrays

@@ -31,6 +31,9 @@ GIVEN_BY_DATA = ("data", "to", "demonstrations", "task")
 """Settings that change no weights, or only by the data, which have a separate hash."""
 ROUNDING = 1e-4
 """Largest difference of an array that follows from the data, relative beyond 1: machines round differently."""
+RISE = 1.1
+"""Rise of the held-out error above its lowest value from which on a policy is said to have memorised: a tenth,
+more than errors vary from epoch to epoch."""
 UNFINISHED = "unfinished-{identity}.npz"
 """Name of the file of weights of an unfinished training."""
 
@@ -51,6 +54,7 @@ class TrainSettings:
     hidden: list[int] = field(default_factory=lambda: [256, 256])
     members: int = 5
     epochs: int = 60
+    patience: int | None = None
     minutes: float | None = None
     seed: int = 0
 
@@ -60,7 +64,7 @@ class TrainSettings:
             raise UnknownName("policy to train", self.policy, KINDS)
         if self.demonstrations is not None and self.demonstrations < MIN_EPISODES:
             raise BadConfig(f"demonstrations = {self.demonstrations}; it must be at least {MIN_EPISODES}")
-        at_least(self, steps=1, chunk=1, played=1, epochs=1, minutes=0.01, seed=0)
+        at_least(self, steps=1, chunk=1, played=1, epochs=1, patience=1, minutes=0.01, seed=0)
         if self.played > self.chunk:
             raise BadConfig(f"played = {self.played}; it must be at most chunk = {self.chunk}")
         if not 1 <= self.members <= MAX_MEMBERS:
@@ -89,6 +93,19 @@ class Trained:
     """Processor time, that of earlier runs included [s]."""
     earlier: int
     """Number of epochs of earlier runs."""
+
+    @property
+    def memorised(self) -> str:
+        """A line about a policy that memorised its demonstrations: the error of those fell on, and that of the
+        held-out ones rose; empty for others."""
+        if not self.losses:
+            return ""
+        (learned, held_out), best = self.losses[-1], min(range(len(self.losses)), key=lambda k: self.losses[k][1])
+        then, lowest = self.losses[best]
+        if held_out <= RISE * lowest or learned >= then:
+            return ""
+        rose = f"the held-out error rose from {lowest:.3g} after epoch {best + 1} to {held_out:.3g}"
+        return f"{rose}, while that of the demonstrations fell: the policy memorised them"
 
 
 def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, int, str], None]) -> Trained:
@@ -136,20 +153,22 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
         )
         if is_policy(folder):
             copied = samples.copied if settings.policy == KNN else {}
-            return Trained(_same(folder, own, {**scaling, **copied}, limit), (), len(held_out), 0.0, 0)
+            ends_early = limit is not None or settings.patience is not None
+            return Trained(_same(folder, own, {**scaling, **copied}, ends_early), (), len(held_out), 0.0, 0)
         path = folder / UNFINISHED.format(identity=identity[:16])
         _check_unfinished(folder, path)
         try:
-            run = Training(path, settings.policy, hidden, members, samples, validation, epochs, limit, settings.seed)
+            wanted = (epochs, limit, settings.seed, settings.patience)
+            run = Training(path, settings.policy, hidden, members, samples, validation, *wanted)
         except (Broken, ValueError, OSError) as error:
             raise BadConfig(f"{path} is damaged ({cut(str(error))}); delete it to start again") from None
         earlier = len(run.losses)
-        while run.share < 1.0:
+        while not run.is_over:
             run.advance()
             progress(len(run.losses), epochs, f"loss {run.losses[-1][0]:.4f}, held out {run.losses[-1][1]:.4f}")
-        own = replace(own, epochs=len(run.losses))
+        own = replace(own, epochs=len(run.losses) if settings.patience is None else run.best_epoch)
         write(folder / LOSS, _curve(own, run.losses))
-        own = StoredPolicy(own, {**scaling, **run.arrays}).write(folder)
+        own = StoredPolicy(own, {**scaling, **run.kept}).write(folder)
         path.unlink(missing_ok=True)
     return Trained(own, tuple(run.losses), len(held_out), run.seconds, earlier)
 
@@ -159,7 +178,8 @@ def train(settings: TrainSettings, data: TrainingData, progress: Callable[[int, 
 
 def _identity(settings: TrainSettings, data: TrainingData) -> str:
     """Hash of everything that decides the weights."""
-    chosen = {name: value for name, value in asdict(settings).items() if name not in GIVEN_BY_DATA}
+    given = {name: value for name, value in asdict(settings).items() if name not in GIVEN_BY_DATA}
+    chosen = {name: value for name, value in given.items() if name != "patience" or value is not None}
     versions = {"format": FORMAT, "version": _version("scengen")}
     values = {**chosen, "sha256": data.sha256, "task_version": data.task_version, "streams": data.streams, **versions}
     return sha256(json.dumps(values, sort_keys=True))
@@ -183,14 +203,14 @@ def _alone(folder: Path) -> Iterator[None]:
 
 
 def _same(
-    folder: Path, own: PolicySettings, arrays: Mapping[str, NDArray[np.float32]], limit: float | None
+    folder: Path, own: PolicySettings, arrays: Mapping[str, NDArray[np.float32]], ends_early: bool
 ) -> PolicySettings:
     """The settings of a policy that is there already.
 
     Args:
         own: those that the training gives.
         arrays: those of its arrays that follow from the data without a training.
-        limit: largest processor time of the training [s], before which it may end; None if there is none.
+        ends_early: whether the training may end before its last epoch.
 
     Raises:
         BadConfig: it comes from another training, or has entries that this training does not give.
@@ -199,7 +219,7 @@ def _same(
     found = stored.settings
     if found.training_sha256 != own.training_sha256:
         raise BadConfig(f"{folder} holds a policy of other data or settings; choose another to=, or delete it")
-    free = ("weights_sha256", "versions", *(["epochs"] if limit else []))
+    free = ("weights_sha256", "versions", *(["epochs"] if ends_early else []))
     wrong = [f.name for f in fields(own) if f.name not in free and getattr(found, f.name) != getattr(own, f.name)]
     wrong += [name for name, array in arrays.items() if not _alike(stored.arrays.get(name), array)]
     if wrong:

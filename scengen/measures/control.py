@@ -9,8 +9,8 @@ from ..samplers.conditions import KINDS, LEVELS, strengths
 from ..samplers.split import ID
 from ..samplers.task import Task
 from ..scenario import Conditions, Scenario
-from ..validate.certify import Trial, lower_bound
-from ..validate.settings import QUICK, CertifySettings
+from ..validate.certify import Trial
+from ..validate.settings import QUICK, CertifySettings, lower_bound
 from .measurement import Job, Measurement, Result, Row
 from .scenarios import feasible
 

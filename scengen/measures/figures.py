@@ -21,7 +21,7 @@ from ..ood.behaviour import HELD_OUT
 from ..ood.belief import moves_hidden
 from ..samplers.split import ID
 from ..samplers.task import Task
-from ..validate.certify import lower_bound
+from ..validate.settings import lower_bound
 from .policies import POLICIES, REPLAY, UNTRAINED
 
 CERTIFIED = ("certified", "oracle", "robosuite")

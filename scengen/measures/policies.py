@@ -26,6 +26,7 @@ from ..pool import Pool
 from ..pool.manifest import MANIFEST
 from ..samplers.split import ID
 from ..samplers.task import Task
+from ..work.targets import appearing
 from .measurement import Job, Measurement, Result, Row
 
 POLICIES = (BC, MIP, KNN)
@@ -279,11 +280,9 @@ class Trainings(_OfPolicies):
 def _changed(source: Path, to: Path, change: Callable[[Path], None]) -> None:
     """Make a changed copy of a recording, unless it is there."""
     if not to.exists():
-        unfinished = to.with_suffix(".unfinished")
-        shutil.rmtree(unfinished, ignore_errors=True)
-        shutil.copytree(source, unfinished)
-        change(unfinished)
-        unfinished.rename(to)
+        with appearing(to, folder=True) as part:
+            shutil.copytree(source, part, dirs_exist_ok=True)
+            change(part)
 
 
 def choose(recording: Path, count: int) -> None:

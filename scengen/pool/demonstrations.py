@@ -206,7 +206,7 @@ def _check(manifest: DemonstrationManifest) -> None:
     check_text("config.split", config.split, MAX_TEXT)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Demonstrations(StoredRows[DemonstrationManifest, DemonstrationRow]):
     """A finished folder of demonstrations, opened for reading: in the order of their attempts."""
 

@@ -15,7 +15,7 @@ from .row import PoolRow
 from .rows import StoredRows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Pool(StoredRows[Manifest, PoolRow]):
     """A finished pool, opened for reading: its scenarios in the order of their indices."""
 

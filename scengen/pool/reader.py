@@ -89,7 +89,8 @@ class Reader:
             shard = self.files[number]
             metadata, ends = shards.read_footer(shard)
             if (found := ends[-1] if ends else 0) != shard.rows:
-                raise PoolError(f"{shard.path} holds {found} rows, and the manifest promises {shard.rows}")
+                why = f"holds {found} rows, and the manifest promises {shard.rows}"
+                raise PoolError(f"{shard.path} {why}; restore the pool, or generate it again")
             return metadata, ends
 
         return footer

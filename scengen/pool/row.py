@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from .. import html_tables
 from ..certificate import StoredCertificate
 from ..control.loop import ACTION
 from ..params import Value
@@ -21,7 +22,7 @@ NO_WITNESS: NDArray[np.float32] = np.zeros((0, ACTION), np.float32)
 """Witness of a row that was read without its witness."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class SceneRow:
     """Columns of every row: a scenario with recorded actions.
 
@@ -57,6 +58,15 @@ class SceneRow:
     """Actions of a success as the controller received them, shape (n, 7 * arms)."""
     witness_sha256: Annotated[str, matching(HASH)]
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name})"
+
+    def _repr_html_(self) -> str:
+        """Its parameters, in a notebook, those of the axes first."""
+        known = {**self.shifted, **self.params}
+        rows = [(name, value, name in self.shifted) for name, value in known.items()]
+        return html_tables.table(str(self.name), ("parameter", "value", "changed by the axis"), rows, len(rows))
+
     @property
     def name(self) -> Name:
         """Name of the scenario for people."""
@@ -77,14 +87,14 @@ class SceneRow:
         return cls(**{name: readers[name](name, value) for name, value in plain.items()}, witness=witness)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class PoolRow(SceneRow):
     """One scenario of a pool."""
 
     certificate: Annotated[StoredCertificate, columns.certificate] = field(repr=False)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class DemonstrationRow(SceneRow):
     """One demonstration: actions that solve a scenario, or a failed attempt."""
 

@@ -1,5 +1,6 @@
 """Rows in a folder with a manifest: what pools and demonstrations have in common."""
 
+import importlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -7,9 +8,10 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
-from ..errors import PoolError, UnknownName
+from ..errors import BadConfig, PoolError, UnknownName
 from .directory import Directory
 from .files import Identity, sha256_of_file, why_damaged
 from .manifest import FileEntry
@@ -38,11 +40,13 @@ class StoredManifest(Protocol):
         ...
 
 
+HEAVY = ("scene_xml", "scene_sha256", "witness_sha256", "certificate")
+"""Columns that a table for people leaves out."""
 AnyManifest = TypeVar("AnyManifest", bound=StoredManifest)
 AnyRow = TypeVar("AnyRow", bound=SceneRow)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StoredRows(Generic[AnyManifest, AnyRow]):
     """A finished folder of rows, opened for reading."""
 
@@ -63,6 +67,9 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
 
     def __post_init__(self) -> None:
         _ = self._home
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({str(self.folder)!r}: {len(self)} of {self.task}/{self.split})"
 
     def __len__(self) -> int:
         """Number of rows, by the manifest."""
@@ -124,6 +131,34 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
                 raise UnknownName("light column of a pool", name, known)
         for values in self._reader.rows(names) if places is None else self._reader.rows_at(places, names):
             yield tuple(values[name] for name in names)
+
+    def to_arrow(self) -> pa.Table:
+        """One row for each scenario: its light columns, and a column for each parameter.
+
+        Scenes, witnesses and certificates are left out. A parameter with the name of a column is called `params.NAME`.
+
+        Raises:
+            PoolError: a file cannot be read.
+        """
+        names = [name for name in self._names(witness=False) if name not in ("params", "shifted", *HEAVY)]
+        found = []
+        for *values, params in self.columns(*names, "params"):
+            row = dict(zip(names, values, strict=True))
+            found.append({**row, **{f"params.{name}" if name in row else name: v for name, v in params.items()}})
+        return pa.Table.from_pylist(found)
+
+    def to_pandas(self) -> Any:
+        """The table of `to_arrow` as a data frame of pandas.
+
+        Raises:
+            PoolError: a file cannot be read.
+            BadConfig: pandas is not installed.
+        """
+        try:
+            importlib.import_module("pandas")
+        except ImportError:
+            raise BadConfig("to_pandas needs pandas; pip install pandas, or use to_arrow()") from None
+        return self.to_arrow().to_pandas()
 
     def names(self) -> Iterator[Name]:
         """Names of the scenarios of all rows, in their order.

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from ..attack import campaign as attacks
 from ..attack.check import attacked
@@ -24,7 +25,7 @@ from ..work.limits import at_least, check_count
 from ..work.parallel import Limits, Workers
 from .attempts import Progress, Wanted, extend, first_of, infeasible, rejection, reported_write_errors
 from .filling import Filling, moved_shards
-from .journal import Journal, Record
+from .journal import Journal, Record, start_over
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,12 @@ class GenerateSettings:
     limit_seconds: float = 600.0
     limit_mb: int = 4000
     attack: int = 0
+    fresh: bool = False
+    json: str | None = None
+
+    def folder(self, task: Task) -> Path:
+        """Folder of the pool."""
+        return Path(self.pool or Path("generated", f"{task.name}-{Split.parse(self.split)}"))
 
     def check(self, task: Task) -> None:
         """Raise `ScengenError` for a setting that makes no sense for this task."""
@@ -72,6 +79,12 @@ class Summary:
     """Report of the adversary, if an attack was requested."""
     cpu: float
     """Processor time of all counted indices, in this run or earlier ones [s]."""
+
+    def plain(self) -> dict[str, Any]:
+        """The summary as plain data."""
+        counts = {name: getattr(self, name) for name in ("certified", "indices", "first_draws", "funnel", "reasons")}
+        attack = self.attack and self.attack.plain()
+        return {"pool": str(self.pool.folder), "sha256": self.pool.sha256, **counts, "cpu": self.cpu, "attack": attack}
 
 
 @dataclass(frozen=True)
@@ -134,7 +147,9 @@ def generate(task: Task, certify_settings: CertifySettings, settings: GenerateSe
     """
     settings.check(task)
     split = Split.parse(settings.split)
-    folder = Path(settings.pool or Path("generated", f"{task.name}-{split}"))
+    folder = settings.folder(task)
+    if settings.fresh:
+        start_over(folder)
     job = Job(task, split, settings.sampler, settings.seed, certify_settings, tuple(settings.keep))
     config = _config(job)
     journal = Journal(folder, {"config": asdict(config), **made_with(task)})

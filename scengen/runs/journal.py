@@ -5,7 +5,7 @@ import shutil
 import sqlite3
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from ..pool.manifest import MANIFEST, FileEntry
 from ..pool.row import SceneRow
 from ..sim.embodiment import action_size
 from ..work.log import different
-from ..work.targets import refused, try_folder
+from ..work.targets import move_aside, refused, try_folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +79,8 @@ class Journal:
             raise PoolError(f"{pool} cannot become a pool; name a folder of its own with {setting}=")
         check_target(pool, manifest, setting)
         try_folder(pool)
-        self.folder, self._kind, self._setting = pool.with_name(pool.name + ".run"), kind, setting
-        self._path = self.folder / "journal.sqlite"
+        self.folder, self._kind, self._setting = _run_of(pool), kind, setting
+        self._path = self.folder / JOURNAL
         if (pool / manifest).exists() and not self._path.exists():
             raise PoolError(f"{pool} is finished and its run's journal is gone; choose another {setting}=")
         new = not self.folder.exists()
@@ -119,8 +119,8 @@ class Journal:
         if before is not None and begun[0] != text:
             differs = ", ".join(different(before, json.loads(text)))
             raise PoolError(
-                f"{pool} was started with other settings ({differs}); choose another {self._setting}=, or move it and "
-                f"{self.folder} aside"
+                f"{pool} was started with other settings ({differs}); give fresh=true to move it aside and start over, "
+                f"or choose another {self._setting}="
             )
 
     def records(self) -> dict[int, Record]:
@@ -205,3 +205,49 @@ _FAULT = {
     sqlite3.SQLITE_NOTADB: _DAMAGED,
 }
 """Fault of a journal and its remedy, by SQLite's primary result code."""
+
+
+def begun(pool: Path) -> int:
+    """Number of indices, or attempts, that earlier runs have finished for a pool."""
+    path = _run_of(pool) / JOURNAL
+    if not path.is_file():
+        return 0
+    try:
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as db:
+            return db.execute("SELECT count(*) FROM record").fetchone()[0]
+    except sqlite3.Error:
+        return 0  # opening it to write says what is wrong
+
+
+def start_over(pool: Path, manifest: str = MANIFEST, setting: str = "pool") -> list[Path]:
+    """Move a pool, and the run that made it, aside, so that another run can start in their place.
+
+    Args:
+        manifest: see `Journal`.
+        setting: see `Journal`.
+
+    Returns:
+        New names of what was moved.
+
+    Raises:
+        ScengenError: the folder is something else, or a run is writing it.
+    """
+    check_target(pool, manifest, setting)
+    run = _run_of(pool)
+    try:
+        with FileLock(run / "lock", timeout=0) if run.exists() else nullcontext():
+            pass
+    except Timeout:
+        raise PoolError(f"another run is writing {pool}; wait for it, and start over then") from None
+    except OSError as error:
+        raise refused(run, error) from None
+    return move_aside(*(path for path, mark in ((pool, manifest), (run, JOURNAL)) if (path / mark).exists()))
+
+
+def _run_of(pool: Path) -> Path:
+    """Folder of the run that makes a pool."""
+    return pool.with_name(pool.name + ".run")
+
+
+JOURNAL = "journal.sqlite"
+"""Name of the journal in the folder of a run."""

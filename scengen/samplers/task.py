@@ -13,11 +13,10 @@ from typing import Any
 from .. import html_tables
 from ..assets.mesh_prop import MeshProp
 from ..assets.ycb import Scan, Ycb, by_name
-from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest
+from ..errors import BadConfig, Infeasible, UnknownName, cut, nearest, place_of
 from ..params import Parameter, Value, parameters, with_values
 from ..scenario import Conditions, Refutation, Scenario
 from ..sim.embodiment import EMBODIMENTS
-from ..work.foreign import place_of
 from . import conditions, designs
 from .axis import Axis, Proof
 from .designs import Design, Independent
@@ -49,7 +48,7 @@ class Proposal:
     """Training scenario of the same index; None in the training split."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Draw:
     """A scenario and its origin."""
 
@@ -74,17 +73,25 @@ class Draw:
     rejected: Mapping[str, int]
     """Number of earlier infeasible tries, by reason."""
 
+    @property
+    def _name(self) -> str:
+        return f"{self.task}/{self.split}@{self.index}/{self.scenario.id}"
+
+    def __repr__(self) -> str:
+        changed = f": {html_tables.spoken(self.shifted)}" if self.shifted else ""
+        return f"Draw({self._name}{changed})"
+
     def _repr_html_(self) -> str:
         """Its parameters that vary, in a notebook, those of the axes first."""
         every = {p.name: p for p in parameters(self.scenario)}
         varied = [every[name] for name in every if name in self.quantiles and name not in self.shifted]
         rows = [(p.name, p.nominal, p.unit, p.name in self.shifted) for p in map(every.get, self.shifted) if p]
         rows += [(p.name, p.nominal, p.unit, False) for p in varied]
-        title = f"{self.task}/{self.split}@{self.index}/{self.scenario.id}, training twin {self.id_twin}"
+        title = f"{self._name}, training twin {self.id_twin}"
         return html_tables.table(title, ("parameter", "value", "unit", "changed by the axis"), rows, len(rows))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Task:
     """One benchmark task."""
 
@@ -112,6 +119,9 @@ class Task:
     """Contents of the task file, with measured limits and the changes of the command line."""
     scans: Mapping[str, Scan] = field(default_factory=dict, repr=False)
     """Solids that replace the proxies of YCB objects, by `Ycb.called`."""
+
+    def __repr__(self) -> str:
+        return f"Task({self.name} version {self.version}: {len(self.axes)} axes)"
 
     @property
     def version(self) -> int:

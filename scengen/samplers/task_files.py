@@ -29,6 +29,8 @@ ID = "id"
 """Name of the training split."""
 EMBODIMENT = "panda_jaw"
 """Default robot of a task: one arm with a jaw."""
+SEARCH_PATH = "hydra.searchpath="
+"""Override that adds folders of configuration."""
 SELF = "_self_"
 """Word for the file itself in the list `defaults` of a file."""
 ORIGINS = ("defaults", "defaults-tree", "searchpath", "config")
@@ -91,8 +93,18 @@ def groups(verb: str) -> list[str]:
 
 
 def search_path(overrides: Sequence[str]) -> tuple[str, ...]:
-    """The overrides that add folders of other packages, `hydra.searchpath=[file:///path/to/conf]`."""
-    return tuple(o for o in overrides if o.startswith("hydra.searchpath="))
+    """The overrides that add folders of other packages, `hydra.searchpath=[file:///path/to/conf]`, with whole paths.
+
+    Plain paths are accepted: `hydra.searchpath=conf,../other/conf`.
+    """
+    return tuple(_whole(o) for o in overrides if o.startswith(SEARCH_PATH))
+
+
+def _whole(override: str) -> str:
+    """An override of the search path with the scheme, the whole path and the quotes that Hydra needs."""
+    folders = [each.strip(" '\"") for each in override.removeprefix(SEARCH_PATH).strip("[] ").split(",")]
+    whole = (f if re.match(r"(file|pkg)://", f) else f"file://{Path(f).expanduser().resolve()}" for f in folders if f)
+    return f"{SEARCH_PATH}[{','.join(map(repr, whole))}]"
 
 
 def tasks(search: Sequence[str] = ()) -> list[str]:
@@ -267,7 +279,7 @@ def unread(folder: str) -> str:
         if shadow.is_file():
             return f"{path} would not be read, scengen has a file of that name; give it another name"
         if group in OF_TASKS and not (here / "task" / path.name).is_file():
-            return f"{path} would not be read, there is no task/{path.name} beside it; name it after a task there"
+            return f"{path} would not be read, its folder has no task/{path.name}; name it after a task there"
         if group == "perturbations":
             return f"{path} would not be read; offer the folder by an installed package, see docs/perturb.md"
     return ""

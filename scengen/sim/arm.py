@@ -37,9 +37,10 @@ class Arm:
         self.scripted_action: NDArray[np.float64] = IDLE
         """Action of a scripted arm in the coming control period, shape (7,)."""
         joints = [model.joint(name) for name in names.joints]
-        self._qpos, self._dofs = [j.qposadr[0] for j in joints], [j.dofadr[0] for j in joints]
-        self._fingers = panda.fingers(model, names)
-        self._site = model.site(names.grip_site).id
+        self._qpos, self._dofs = np.array([j.qposadr[0] for j in joints]), np.array([j.dofadr[0] for j in joints])
+        self._fingers = np.array(panda.fingers(model, names), int)
+        site = model.site(names.grip_site).id
+        self._hand, self._hand_rot = self.data.site_xpos[site], self.data.site_xmat[site].reshape(3, 3)  # views
         self._wrist = model.site(names.wrist_site).id
 
     def __reduce__(self) -> NoReturn:
@@ -53,12 +54,12 @@ class Arm:
     @property
     def hand(self) -> Vec3:
         """Position of the grip site [m], between the finger tips or in the middle of the suction cup's lip."""
-        return self.data.site_xpos[self._site].copy()
+        return self._hand.copy()
 
     @property
     def hand_rot(self) -> Mat3:
         """Orientation of the grip site. Its z axis points out of the hand."""
-        return self.data.site_xmat[self._site].reshape(3, 3).copy()
+        return self._hand_rot.copy()
 
     @property
     def joint_pos(self) -> NDArray[np.float64]:
@@ -84,7 +85,7 @@ class Arm:
     @property
     def suction(self) -> bool:
         """Whether the hand is a suction cup instead of a jaw."""
-        return not self._fingers
+        return not len(self._fingers)
 
     @property
     def sealed(self) -> bool:
@@ -97,14 +98,24 @@ class Arm:
         A body that droops leaves one pad and leans on the face of the finger below it.
         """
         if self.suction:
-            return self.sealed and self.world.touching(Names(self.number).cup_pads, body)
+            return self.sealed and self.world.touching(self._cup_pads, body)
         pads, rest = zip(*self._touches(body), strict=True)
         return any(pads) and all(pad or other for pad, other in zip(pads, rest, strict=True))
 
     def _touches(self, body: str) -> list[tuple[bool, ...]]:
         """Whether the pad and the rest of each finger touch a body."""
-        touching, fingers = self.world.touching, Names(self.number).finger_bodies
-        return [tuple(touching(part, body) for part in finger) for finger in fingers]
+        touching = self.world.touching
+        return [tuple(touching(part, body) for part in finger) for finger in self._finger_bodies]
+
+    @functools.cached_property
+    def _finger_bodies(self) -> tuple[tuple[str, ...], ...]:
+        """Names of the pad and of the rest of each finger."""
+        return tuple(map(tuple, Names(self.number).finger_bodies))
+
+    @functools.cached_property
+    def _cup_pads(self) -> str:
+        """Name of the body with the pads of the cup."""
+        return Names(self.number).cup_pads
 
     @property
     def idle(self) -> NDArray[np.float64]:

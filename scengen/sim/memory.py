@@ -34,20 +34,22 @@ class Memory:
         """
         self.names = _names(model)
         """Names in the order of the user data."""
-        self._data, self._check = data, check
+        self._numbers, self._check = data.userdata, check
+        self._index = {name: number for number, name in enumerate(self.names)}
 
     def __getitem__(self, name: str) -> float:
-        return float(self._data.userdata[self._index(name)])
+        return self._numbers.item(self._at(name))
 
     def __setitem__(self, name: str, value: float) -> None:
         self._check()
-        self._data.userdata[self._index(name)] = value
+        self._numbers[self._at(name)] = value
 
-    def _index(self, name: str) -> int:
+    def _at(self, name: str) -> int:
         """Index of a name in the user data."""
-        if name not in self.names:
-            raise UnknownName("memory", name, self.names)
-        return self.names.index(name)
+        try:
+            return self._index[name]
+        except KeyError:
+            raise UnknownName("memory", name, self.names) from None
 
 
 def _names(model: mujoco.MjModel) -> tuple[str, ...]:

@@ -3,8 +3,8 @@
 import functools
 import hashlib
 import weakref
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -26,6 +26,7 @@ from .style import Style
 
 MAX_MEANS = 12
 """Largest number of means of a task."""
+BODY = mujoco.mjtObj.mjOBJ_BODY
 
 
 def _revived(kind: "type[World]", model: mujoco.MjModel, scripted: int, state: NDArray[np.float64]) -> "World":
@@ -35,7 +36,7 @@ def _revived(kind: "type[World]", model: mujoco.MjModel, scripted: int, state: N
     return world
 
 
-@dataclass
+@dataclass(repr=False)
 class World:
     """Simulation that maps names to numbers. It holds no task logic. `World.load` makes it, `step` drives it."""
 
@@ -65,12 +66,19 @@ class World:
     _happening: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
+        data = self.data
+        self._pos, self._com, self._rot = data.xpos, data.xipos, data.xmat.reshape(-1, 3, 3)  # views of MuJoCo's memory
+        self._forces = data.xfrc_applied
         every = tuple(Arm(self, names.number) for names in panda.arms(self.model))
         self.arms, self.partners = every[: len(every) - self.scripted], every[len(every) - self.scripted :]
         this = weakref.proxy(self)
         self.memory = Memory(self.model, self.data, lambda: this.check_event("writing to the memory"))
         self.filter, self.shown = Filter(len(self.arms)), np.zeros(MAX_MEANS)
         self.channel = Channel(self.loop.impairment, self.size)
+
+    def __repr__(self) -> str:
+        arms = f"{len(self.arms)} arms" if len(self.arms) > 1 else "1 arm"
+        return f"World({self.model.nbody} bodies, {arms}, time {self.time:.2f} s)"
 
     @classmethod
     def load(cls, scene_xml: str, embodiment: str = JAW, look: Look | None = None, substeps: int | None = None) -> Self:
@@ -173,20 +181,12 @@ class World:
 
     # --- events ---------------------------------------------------------------------------
 
-    @contextmanager
-    def events(self) -> Iterator[None]:
+    def events(self) -> AbstractContextManager[None]:
         """The moment before a control period in which a scenario's events happen. An `Episode` opens it.
 
         Forces (`force`) and partners' actions (`Arm.set_action`) of the previous period end here.
         """
-        self._happening = True
-        self.data.xfrc_applied[:] = 0.0
-        for arm in self.partners:
-            arm.grip, arm.scripted_action = -1.0, IDLE
-        try:
-            yield
-        finally:
-            self._happening = False
+        return _Moment(self)
 
     def check_event(self, what: str) -> None:
         """Raise `NoEvent` unless events happen now.
@@ -249,7 +249,7 @@ class World:
             NoEvent: the caller is not a scenario's `events`.
         """
         self.check_event(f"pushing {body}")
-        self.data.xfrc_applied[self.body(body), :3] = force
+        self._forces[self.body(body), :3] = force
 
     def drive(self, joint: str, goal: float) -> None:
         """Send a joint with a servo (`prop.servo`) to `goal` [rad or m] from the coming control period on.
@@ -291,51 +291,51 @@ class World:
     @property
     def idle(self) -> NDArray[np.float64]:
         """Action without motion that keeps all gripper commands, shape (7 * arms,)."""
-        return np.concatenate([arm.idle for arm in self.arms])
+        return self.arms[0].idle if len(self.arms) == 1 else np.concatenate([arm.idle for arm in self.arms])
 
     def pos(self, body: str) -> Vec3:
         """Position of a body's origin [m]."""
-        return self.data.xpos[self.body(body)].copy()
+        return self._pos[self.body(body)].copy()
 
     def com(self, body: str) -> Vec3:
         """Position of a body's centre of mass [m]."""
-        return self.data.xipos[self.body(body)].copy()
+        return self._com[self.body(body)].copy()
 
     def rot(self, body: str) -> Mat3:
         """Orientation of a body."""
-        return self.data.xmat[self.body(body)].reshape(3, 3).copy()
+        return self._rot[self.body(body)].copy()
 
     def tilt(self, body: str) -> float:
         """Angle between a body's z axis and the vertical [rad]."""
-        return float(np.arccos(min(1.0, max(-1.0, self.data.xmat[self.body(body), 8]))))
+        return float(np.arccos(min(1.0, max(-1.0, self._rot.item(self.body(body), 2, 2)))))
 
     def velocity(self, body: str) -> NDArray[np.float64]:
         """Angular [rad/s] and linear [m/s] velocity of a body's centre of mass, world axes, shape (6,)."""
         velocity = np.zeros(6)
-        mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, self.body(body), velocity, 0)
+        mujoco.mj_objectVelocity(self.model, self.data, BODY, self.body(body), velocity, 0)
         return velocity
 
     def hinge(self, joint: str) -> tuple[float, float]:
         """Angle [rad] and rate [rad/s] of a hinge."""
-        found = self.model.joint(joint)
-        return float(self.data.qpos[found.qposadr[0]]), float(self.data.qvel[found.dofadr[0]])
+        place, speed = self._hinge(joint)
+        return self.data.qpos.item(place), self.data.qvel.item(speed)
 
     def touching(self, a: str, b: str) -> bool:
         """Whether two bodies were in contact at any physics step of the last control period.
 
         `ROBOT` and the `label` of an arm are accepted in place of a body.
         """
-        return bool(self.loop.touching[self.row(a), self.row(b)])
+        return self.loop.touching.item(self.row(a), self.row(b)) != 0
 
     def touched(self, a: str, b: str) -> bool:
         """Whether two bodies were in contact at any physics step since the start. Names as for `touching`."""
-        return bool(self.loop.touched[self.row(a), self.row(b)])
+        return self.loop.touched.item(self.row(a), self.row(b)) != 0
 
     def touching_bodies(self, body: str) -> set[str]:
         """Names of the bodies that touched a body in the last control period. `ROBOT` stands for the robot's bodies."""
-        others = self.loop.touching[self.row(body)]
-        scene = {self.model.body(int(i)).name for i in np.flatnonzero(others[: self.model.nbody]) if i not in self.own}
-        return scene | {ROBOT} if others[-1] and body != ROBOT else scene
+        names = self._others
+        found = {names[i] for i in self.loop.touching[self.row(body)].nonzero()[0].tolist() if i in names}
+        return found - {ROBOT} if body == ROBOT else found
 
     @property
     def free_bodies(self) -> tuple[str, ...]:
@@ -377,9 +377,10 @@ class World:
 
     def body(self, name: str) -> int:
         """Index of a named body."""
-        if name not in self._bodies:
-            raise UnknownName("body", name, self._bodies)
-        return self._bodies[name]
+        try:
+            return self._bodies[name]
+        except KeyError:
+            raise UnknownName("body", name, self._bodies) from None
 
     @functools.cached_property
     def _bodies(self) -> dict[str, int]:
@@ -399,6 +400,29 @@ class World:
         return {name: self.model.nbody + k for k, name in enumerate(names)}
 
     @functools.cached_property
+    def _rows(self) -> dict[str, int]:
+        """Rows of the loop's contact tables by name."""
+        return self._bodies | self._labels
+
+    @functools.cached_property
+    def _others(self) -> dict[int, str]:
+        """Names of the bodies that `touching_bodies` tells, by row of the contact tables."""
+        scene = {row: name for name, row in self._bodies.items() if row not in self.own}
+        return scene | {self._labels[ROBOT]: ROBOT}
+
+    @functools.cached_property
+    def _hinge(self) -> Callable[[str], tuple[int, int]]:
+        """Function that finds the places of a hinge's angle and of its rate in the state."""
+        model = self.model
+
+        @functools.cache
+        def places(joint: str) -> tuple[int, int]:
+            found = model.joint(joint)
+            return int(found.qposadr[0]), int(found.dofadr[0])
+
+        return places
+
+    @functools.cached_property
     def _free(self) -> tuple[str, ...]:
         """Names of all bodies with a free joint."""
         joints = np.flatnonzero(self.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
@@ -406,7 +430,25 @@ class World:
 
     def row(self, name: str) -> int:
         """Row of the loop's contact tables for a name as in `touching`."""
-        return self._labels[name] if name in self._labels else self.body(name)
+        found = self._rows.get(name)
+        return self.body(name) if found is None else found
+
+
+class _Moment(AbstractContextManager[None]):
+    """The moment in which a scenario's events happen in a world."""
+
+    def __init__(self, world: World):
+        self._world = world
+
+    def __enter__(self) -> None:
+        world = self._world
+        world._happening = True
+        world._forces[:] = 0.0
+        for arm in world.partners:
+            arm.grip, arm.scripted_action = -1.0, IDLE
+
+    def __exit__(self, *error: object) -> None:
+        self._world._happening = False
 
 
 def scene_geoms(model: mujoco.MjModel) -> list[int]:

@@ -11,6 +11,7 @@ from functools import wraps
 from typing import TypeVar
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
 from ..control import osc
@@ -321,8 +322,20 @@ def steer(arm: Arm, setpoint: Vec3, velocity: Vec3, turn: Vec3, grip: float | No
         grip: gripper command; None keeps the last one.
     """
     action = np.empty(7)
-    action[:3] = velocity / RATE + STIFFNESS * (setpoint - arm.hand)
-    action[3:6] = turn
-    action[:6] = np.clip(action[:6] / STEP, -1.0, 1.0)
+    _steer(setpoint, arm.hand, velocity, turn, action)
     action[6] = arm.grip if grip is None else grip
     return action
+
+
+@njit(nogil=True, cache=True)
+def _steer(setpoint: Vec3, hand: Vec3, velocity: Vec3, turn: Vec3, action: Action) -> None:
+    """Write the motion of `steer` for a hand at a position [m] into an action. A number that is none stays none."""
+    for i in range(3):
+        action[i] = velocity[i] / RATE + STIFFNESS * (setpoint[i] - hand[i])
+        action[3 + i] = turn[i]
+    for i in range(6):
+        action[i] /= STEP[i]
+        if action[i] > 1.0:
+            action[i] = 1.0
+        elif action[i] < -1.0:
+            action[i] = -1.0

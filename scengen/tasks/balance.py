@@ -29,6 +29,7 @@ Decisions where the paper (App. B, T31 and T32) is silent:
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -196,7 +197,7 @@ class UprightRod(RodAndRidge[InlaidRod]):
 
     # --- shortcuts and ablations ------------------------------------------------------------
 
-    @property
+    @cached_property
     def lopsided(self) -> bool:
         """Whether the rod falls if it is turned as little as possible and its foot is centred on the ridge."""
         across = abs(math.remainder(self.rod_yaw - self.ridge_yaw, 180.0)) < 45.0

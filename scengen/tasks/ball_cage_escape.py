@@ -26,7 +26,7 @@ stool's middle, and the end farther from the ball (12 of 12 each).
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import ClassVar
 
 import mujoco
@@ -346,37 +346,37 @@ class BallCageEscape(Scenario):
 
     # --- geometry ---------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def axes(self) -> Mat3:
         """Axes of the cage at the start."""
         return about_z(math.radians(self.yaw))
 
-    @property
+    @cached_property
     def foot(self) -> Vec3:
         """Centre of the cage's foot at the start [m]."""
         return np.array([self.x, self.y, TABLE_TOP + self.stool.height])
 
-    @property
+    @cached_property
     def handle(self) -> Vec3:
         """Place at which the hand grasps the cage [m]."""
         return self.foot + GRIP_HEIGHT * UP
 
-    @property
+    @cached_property
     def way(self) -> float:
         """1 if the ball must roll towards +x in the cage's axes, -1 if towards -x."""
         return math.copysign(1.0, self.cage.offset - self.ball_x) if self.cage.face in (BOTTOM, SIDE) else 1.0
 
-    @property
+    @cached_property
     def room_beyond(self) -> float:
         """Length on which the ball can lie beyond a hole in the bottom [m]; negative: it ends over the hole."""
         return self.cage.cavity[0] / 2 - self.ball.radius - (self.way * self.cage.offset + self.cage.hole)
 
-    @property
+    @cached_property
     def rolling_tilt(self) -> float:
         """Tilt of the floor at which the ball starts to roll by itself [rad]."""
         return math.atan(self.rolling)
 
-    @property
+    @cached_property
     def least_tilt(self) -> float:
         """Tilt that lets the ball out [rad]."""
         return max(self.rolling_tilt, self.cage.rim_tilt(self.ball.radius))

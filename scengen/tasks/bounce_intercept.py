@@ -36,6 +36,7 @@ wall.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -315,18 +316,18 @@ class BounceIntercept(LaunchedBall):
         at = self.start + OBSERVATION_TIME * velocity
         return self.ways(at, velocity, velocity * bool(self.friction), restitution)
 
-    @property
+    @cached_property
     def mirror_miss(self) -> float:
         """Distance of the ball from a hand that waits for its mirror image, when the image would arrive [m]."""
         found = self.meeting(self._ways_after_launch(1.0), PARKED_HAND)
         return math.inf if found is None else math.dist(found[0][:2], place_on(self._ways_after_launch(), found[1])[:2])
 
-    @property
+    @cached_property
     def placed(self) -> PlacedEnclosure:
         """The enclosure in its place, beyond the middle of the table."""
         return PlacedEnclosure.about(self.enclosure, np.array([0.10, 0.0, self.floor]), self.turned)
 
-    @property
+    @cached_property
     def turned(self) -> float:
         """Angle by which the enclosure is turned to the left, `side` included [rad]."""
         return self.side * math.radians(self.turn)
@@ -339,7 +340,7 @@ class BounceIntercept(LaunchedBall):
     def start(self) -> Vec3:
         return np.array([self.x, self.side * self.y, self.floor + self.ball.radius])
 
-    @property
+    @cached_property
     def floor(self) -> float:
         """Height of the mat [m]."""
         return TABLE_TOP + MAT_SIZE[2]

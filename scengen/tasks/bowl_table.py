@@ -33,6 +33,7 @@ pads on the bead 5 mm along it, foot in the square 32 mm.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -98,7 +99,7 @@ class BowlTable(Scenario):
     def build(self) -> mujoco.MjSpec:
         return self._scene(self.bowl)
 
-    @property
+    @cached_property
     def rack(self) -> RingRack:
         """Rack that fits the bowl: at the ring's upper edge the dome is `DOME_CLEARANCE` from it."""
         height = self.bowl.dome_height(self.bowl.radius + RIM_CLEARANCE - DOME_CLEARANCE)
@@ -334,22 +335,22 @@ class BowlTable(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def opening(self) -> Vec3:
         """Direction in which the bowl's opening looks during the handover."""
         return math.cos(self.bowl.bead_slope) * LEFT - math.sin(self.bowl.bead_slope) * UP
 
-    @property
+    @cached_property
     def foot(self) -> Vec3:
         """Position of the rack on the table [m]."""
         return np.array([self.rack_x, self.rack_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def start(self) -> Vec3:
         """Initial position of the middle of the bowl's foot, which is on top [m]."""
         return self.foot + (self.plinth + self.bowl.depth) * UP
 
-    @property
+    @cached_property
     def goal(self) -> Vec3:
         """Goal position of the middle of the bowl's foot [m]."""
         return np.array([self.goal_x, self.goal_y, TABLE_TOP])

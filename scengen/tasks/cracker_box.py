@@ -52,12 +52,12 @@ class BoxAndSlot(Scenario):
         """Slot that fits the box."""
         return slot_for(self.box, self.clearance)
 
-    @property
+    @cached_property
     def start(self) -> Vec3:
         """Initial position of the box [m]."""
         return np.array([self.box_x, self.box_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def foot(self) -> Vec3:
         """Position of the slot on the table [m]."""
         return np.array([self.slot_x, self.slot_y, TABLE_TOP])
@@ -67,10 +67,10 @@ class BoxAndSlot(Scenario):
         """Position of the middle of a box that lies in the middle of the slot [m]."""
         return self.foot + (self.slot.floor + self.box.size[0] / 2) * UP
 
-    @property
+    @cached_property
     def _box_outline(self) -> Outline:
         return corners(self.start, math.radians(self.box_yaw + 90.0), self.box.size)
 
-    @property
+    @cached_property
     def _slot_outline(self) -> Outline:
         return corners(self.foot, math.radians(self.slot_yaw), self.slot.outer)

@@ -182,7 +182,7 @@ class CrackerBoxJaw(BoxAndSlot):
         yield from go_to(arm, arm.hand - 0.03 * out, pace=COARSE)
         yield from retreat(arm, 0.06)
 
-    @property
+    @cached_property
     def _knocking_hand(self) -> Mat3:
         """Orientation of a hand that points down, its fingers side by side across the slot."""
         return facing_down(math.remainder(math.atan2(-self.out[0], self.out[1]), math.pi))
@@ -315,14 +315,14 @@ class CrackerBoxJaw(BoxAndSlot):
         behind = self.box.size[2] - GRIP_DEPTH + PALM_ABOVE
         return math.atan2(PALM_ALONG - self.box.size[0] / 2 + 0.005, behind) + math.radians(2.0)
 
-    @property
+    @cached_property
     def slide_clearance(self) -> float:
         """Clearance along the slot of a box that leans on the far wall, its near end on the near wall's edge [m]."""
         height, depth = self.box.size[2], self.slot.depth
         angle = math.asin(depth / height)
         return self.slot.length - height * math.cos(angle) - depth * math.tan(angle)
 
-    @property
+    @cached_property
     def rim(self) -> float:
         """Height of the slot's walls [m]."""
         return TABLE_TOP + self.slot.floor + self.slot.depth

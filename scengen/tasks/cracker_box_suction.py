@@ -27,6 +27,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -305,7 +306,7 @@ class CrackerBoxSuction(BoxAndSlot):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def misfit(self) -> float:
         """Angle between the long side of a box that is turned down as it comes, and that of the slot [deg]."""
         return abs(math.remainder(self.slot_yaw - self.box_yaw, 180.0))

@@ -41,6 +41,7 @@ little influence: if the jaw opens 0.1 s earlier or later, the cube lands within
 import math
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import mujoco
@@ -346,17 +347,17 @@ class CubeToss(Scenario):
 
     # --- mechanics and geometry ---------------------------------------------------------------
 
-    @property
+    @cached_property
     def opening_time(self) -> float:
         """Time from the command until the jaw has let go of the cube [s]."""
         return jaw.time_to_free(self.cube.edge)
 
-    @property
+    @cached_property
     def farthest_throw(self) -> tuple[float, float]:
         """Time of flight after a full swing [s], and distance of the landing place from the robot's axis [m]."""
         return self._full_throw(self.landing_height)
 
-    @property
+    @cached_property
     def table_crossing(self) -> float:
         """Time after which it passes the height of the table [s]."""
         return self._full_throw(TABLE_TOP)[0]
@@ -369,12 +370,12 @@ class CubeToss(Scenario):
         seconds, place = flight(start, np.array([outwards, 0.0, upwards]), height)
         return seconds, float(place[0])
 
-    @property
+    @cached_property
     def _beyond_diagonal(self) -> bool:
         """Whether the tray is at a bearing at which only one axis drives the hand at its limit."""
         return abs(self.bearing) > DIAGONAL_BEARING
 
-    @property
+    @cached_property
     def landing_height(self) -> float:
         """Height of the rim of the tray, where the middle of the cube must come down [m]."""
         return float(self.spot[2]) + self.tray.floor + self.tray.depth
@@ -385,23 +386,23 @@ class CubeToss(Scenario):
         a = math.radians(self.turn)
         return (self.opening - edge) / 2 * abs(math.cos(a)) + (BREADTH - edge) / 2 * abs(math.sin(a))
 
-    @property
+    @cached_property
     def u(self) -> Vec3:
         """Unit vector from the robot to the tray, seen from above."""
         return heading(self.bearing)
 
-    @property
+    @cached_property
     def across(self) -> Vec3:
         """Level unit vector at right angles to `u`, to its left."""
         return np.cross(UP, self.u)
 
-    @property
+    @cached_property
     def tray(self) -> Bin:
         """Lined, so that the cube does not slide; its floor is thicker than the cube moves in a time step."""
         yellow = (0.95, 0.75, 0.20, 1.0)  # on a grey floor
         return Bin(width=self.opening, length=BREADTH, depth=0.10, wall=0.010, floor=0.020, friction=1.0, rgba=yellow)
 
-    @property
+    @cached_property
     def spot(self) -> Vec3:
         """Middle of the foot of the tray [m]."""
         return ROBOT_AXIS + self.distance * self.u + (0.01 if self.rate else self.stand) * UP  # a riding tray hovers

@@ -31,7 +31,7 @@ Decisions, where the paper (App. B, T24) is silent:
 import math
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import mujoco
 import numpy as np
@@ -334,23 +334,23 @@ class CupExtract(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def foot(self) -> Vec3:
         """Initial position of the cup's foot [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
-    @property
+    @cached_property
     def goal(self) -> Vec3:
         """Middle of the square [m]."""
         return np.array([self.goal_x, self.goal_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def sliding_tilt(self) -> float:
         """Tilt of the cup at which the block slides [rad]: two edges of the block lie on the wall as in a groove."""
         aslant = math.asin(self.block.width / 2 / (self.cup.rim - self.cup.wall))
         return math.pi / 2 + math.atan(self.cup.friction / math.cos(aslant))
 
-    @property
+    @cached_property
     def aside(self) -> Vec3:
         """Place for the empty cup, on the side away from the square [m]."""
         return np.array([-0.13, math.copysign(0.25, -self.goal_y), TABLE_TOP])

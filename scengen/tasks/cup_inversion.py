@@ -29,6 +29,7 @@ Decisions, where the paper (App. B, T04) is silent:
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -358,27 +359,27 @@ class CupInversion(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def start(self) -> Vec3:
         """Initial position of the cup's middle on the table [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
-    @property
+    @cached_property
     def goal(self) -> Vec3:
         """Position of the middle of the square [m]."""
         return np.array([self.goal_x, self.goal_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def grip_radius(self) -> float:
         """Distance of the middle of the bead, which the jaw takes, from the cup's axis [m]."""
         return self.cup.rim - self.cup.bead / 2
 
-    @property
+    @cached_property
     def slope(self) -> float:
         """Slope of the wall: how far it leans out per height."""
         return (self.cup.rim - self.cup.base) / self.cup.height
 
-    @property
+    @cached_property
     def droop(self) -> float:
         """Torque of the level cup's weight about the pads, over the torque that they resist: above 1 the cup turns."""
         lever = self.cup.height - OVERLAP - self.cup.inertial()[0][2]

@@ -251,12 +251,12 @@ class DominoSelect(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def u(self) -> Vec3:
         """Unit vector along the chains, shape (3,)."""
         return heading(self.heading)
 
-    @property
+    @cached_property
     def gap(self) -> float:
         """Free space between neighbouring faces of an intact chain [m]."""
         return self.gap_ratio * self.tile.width
@@ -269,18 +269,18 @@ class DominoSelect(Scenario):
         red, astray = (*dealt[: self.intact], None, *dealt[self.intact :]), Defect(kind=DECOY)
         return (astray, *red) if self.decoy_side < 0 else (*red, astray)
 
-    @property
+    @cached_property
     def intact_lane(self) -> int:
         """Lane of the intact chain, from the right, among all."""
         return self.defects.index(None)
 
-    @property
+    @cached_property
     def end(self) -> Vec3:
         """Place on the foot of the red slab where the intact chain ends [m]."""
         start = self.feet[f"tile_{self.intact_lane}_0"]
         return start + float((self.feet["slab"] - start) @ self.u) * self.u
 
-    @property
+    @cached_property
     def wrong(self) -> list[int]:
         """Lanes of the chains that have a defect."""
         return [k for k in range(LANES) if k != self.intact_lane]

@@ -203,17 +203,17 @@ class DominoSingle(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def u(self) -> Vec3:
         """Unit vector along the chain, shape (3,)."""
         return heading(self.heading)
 
-    @property
+    @cached_property
     def gap(self) -> float:
         """Free space between neighbouring faces [m]."""
         return self.gap_ratio * self.tile.width
 
-    @property
+    @cached_property
     def pieces(self) -> list[Domino]:
         """The starter, the other tiles and the slab, in the order in which they fall."""
         return [self.starter, *[self.tile] * (self.count - 1), self.slab]

@@ -30,6 +30,7 @@ Decisions, where the paper (App. B, T01) says no more than "a thin rectangular p
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -334,43 +335,43 @@ class EdgeSlide(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def aim(self) -> float:
         """Overhang at which the oracle ends its push [m]: two thirds of the way from the least to the largest."""
         longest = self.plate.tipping_overhang - TIPPING_MARGIN
         return MIN_OVERHANG + 2 / 3 * (longest - MIN_OVERHANG)
 
-    @property
+    @cached_property
     def out(self) -> Vec3:
         """Level unit vector out over the edge, shape (3,)."""
         return np.array([0.0, float(self.side), 0.0])
 
-    @property
+    @cached_property
     def along(self) -> Vec3:
         """Level unit vector along the edge, to the right of `out`, shape (3,)."""
         return np.array([float(self.side), 0.0, 0.0])
 
-    @property
+    @cached_property
     def turn(self) -> float:
         """Yaw of the plate [rad]; its strip is towards the edge."""
         return math.radians(self.side * self.yaw) + (0.0 if self.side > 0 else math.pi)
 
-    @property
+    @cached_property
     def spot(self) -> Vec3:
         """Initial position of the plate's middle [m]."""
         return np.array([self.x, self.side * (TABLE_HALF - self.away), TABLE_TOP])
 
-    @property
+    @cached_property
     def outline(self) -> Outline:
         """Outline of the plate at the start."""
         return corners(self.spot, self.turn, self.plate.size)
 
-    @property
+    @cached_property
     def _underside(self) -> Vec3:
         """Corners of the plate's underside in its own axes [m], shape (4, 3)."""
         return np.column_stack([corners([0.0, 0.0], 0.0, self.plate.size), np.zeros(4)])
 
-    @property
+    @cached_property
     def grip(self) -> Mat3:
         """Orientation of the hand that pinches: from the robot's side towards the table, closing up and down.
 

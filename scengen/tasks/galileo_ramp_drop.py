@@ -271,19 +271,19 @@ class GalileoRampDrop(Scenario):
         """Axes of the ramp: along it, across it, up."""
         return about_z(math.radians(self.heading))
 
-    @property
+    @cached_property
     def middle(self) -> Vec3:
         """Point on the table below the middle of the ramp [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
-    @property
+    @cached_property
     def tray(self) -> Vec3:
         """Middle of the tray's foot [m], on the robot's side of the ramp."""
         along, across, _ = self.axes.T
         away = self.ramp.width / 2 + WALL_THICKNESS + self.tray_gap + TRAY.wall + TRAY.length / 2
         return self.middle - self.tray_back * along + away * (across if across[0] <= 0 else -across)
 
-    @property
+    @cached_property
     def outlines(self) -> tuple[Outline, Outline]:
         """Outlines of the ramp and of the tray [m]."""
         yaw, ramp = math.radians(self.heading), (self.ramp.span, self.ramp.width + 2 * WALL_THICKNESS)
@@ -315,7 +315,7 @@ class GalileoRampDrop(Scenario):
         """Place of the right release [m], negative on the near side."""
         return -self.ramp.at_height(self.ramp.release(self.ball.radius))
 
-    @property
+    @cached_property
     def brim(self) -> float:
         """Highest place of release [m], negative on the near side; 15 mm from the top a ball still lies on the ramp."""
         return 0.015 - self.ramp.top

@@ -32,6 +32,7 @@ Decisions where the paper (App. B, T21) is silent:
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -306,37 +307,37 @@ class GapFunnel(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def normal(self) -> Vec3:
         """Unit vector in which the gap leads."""
         return heading(self.yaw)
 
-    @property
+    @cached_property
     def tangent(self) -> Vec3:
         """Unit vector along the wall, to the left."""
         return heading(self.yaw + 90.0)
 
-    @property
+    @cached_property
     def gap_at(self) -> Vec3:
         """Middle of the gap, on the table [m]."""
         return np.array([self.wall_x, self.gap_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def start(self) -> Vec3:
         """Centre of the ball at the start [m]."""
         return self.gap_at - self.before * self.normal + self.offset * self.tangent + self.ball.radius * UP
 
-    @property
+    @cached_property
     def zone_at(self) -> Vec3:
         """Middle of the zone [m]."""
         return self.gap_at + self.run * self.normal
 
-    @property
+    @cached_property
     def kerb_at(self) -> Vec3:
         """Middle of the kerb, at the end of the zone [m]."""
         return self.zone_at + (self.zone.size / 2 + self.kerb.width / 2) * self.normal
 
-    @property
+    @cached_property
     def stop_distance(self) -> float:
         """Distance from the middle of the wall at which the hand stops [m], 8 mm before the palm touches it."""
         return self.wall.thickness / 2 + PALM_ACROSS + 0.008
@@ -345,18 +346,18 @@ class GapFunnel(Scenario):
         """Speed from which the ball rolls a distance [m/s]."""
         return math.sqrt(10 / 7 * self.rolling * GRAVITY * max(0.0, way))
 
-    @property
+    @cached_property
     def needed_speed(self) -> float:
         """Speed at which a ball must leave the hand to come to rest in the middle of the zone [m/s]."""
         return self.speed_for(self.run + self.stop_distance - self.ball.radius - FINGER_ACROSS)
 
-    @property
+    @cached_property
     def arrival_speed(self) -> float:
         """Speed of the fastest ball at the kerb [m/s]."""
         on = self.zone.size / 2 - self.ball.radius
         return math.sqrt(max(0.0, MAX_PUSH_SPEED**2 - self.needed_speed**2 - self.speed_for(on) ** 2))
 
-    @property
+    @cached_property
     def jump_speed(self) -> float:
         """Speed at which a rolling ball gets over the kerb [m/s].
 

@@ -38,6 +38,7 @@ Decisions, where the paper (App. B, T20) is silent or cannot be taken literally:
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -88,7 +89,7 @@ class Spot(Bounded):
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -45.0, 45.0, period=90.0)
 
-    @property
+    @cached_property
     def pos(self) -> Vec3:
         """Middle of the block's foot [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
@@ -307,56 +308,56 @@ class IndirectPush(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def needed(self) -> int:
         """Number of blocks with which a hand at `MAX_PUSH_DISTANCE` brings the target into the zone."""
         return max(
             1, math.ceil((self.distance + self.way - ZONE_SIZE / 2 + END_MARGIN - MAX_PUSH_DISTANCE) / self.edge - 0.5)
         )
 
-    @property
+    @cached_property
     def stretch(self) -> float:
         """Bound of the tips' distance in any posture, up to the height of a block's upper edge [m]: `panda.REACH`."""
         drop = SHOULDER[2] - TABLE_TOP - self.edge
         return math.sqrt(REACH**2 - drop**2) + TIP_BELOW
 
-    @property
+    @cached_property
     def chosen(self) -> list[str]:
         """Names of the blocks for the chain, its head first: those nearest to its place."""
         order = sorted(range(len(self.spots)), key=lambda i: math.dist(self.spots[i].pos, self.at(CHAIN_DISTANCE)))
         return [f"block_{i}" for i in order[: self.needed]]
 
-    @property
+    @cached_property
     def spots(self) -> tuple[Spot, ...]:
         """Poses of the blocks at the start."""
         return self.block_0, self.block_1, self.block_2
 
-    @property
+    @cached_property
     def angle(self) -> float:
         """Bearing of target and zone [rad]."""
         return math.radians(self.bearing)
 
-    @property
+    @cached_property
     def turn(self) -> float:
         """Yaw of the target [rad]."""
         return self.angle + math.radians(self.target_yaw)
 
-    @property
+    @cached_property
     def u(self) -> Vec3:
         """Level unit vector outwards along the bearing, shape (3,)."""
         return heading(self.bearing)
 
-    @property
+    @cached_property
     def side(self) -> Vec3:
         """Level unit vector to the left of `u`, shape (3,)."""
         return heading(self.bearing + 90.0)
 
-    @property
+    @cached_property
     def pitch(self) -> float:
         """Distance from one block of the chain to the next [m], with 4 mm between them."""
         return self.edge + 0.004
 
-    @property
+    @cached_property
     def height(self) -> float:
         """Height of the grip site in a push [m]: below the middle of a block, the tips 8 mm above the table."""
         return TABLE_TOP + max(0.4 * self.edge, TIP_BELOW + 0.008)
@@ -369,28 +370,28 @@ class IndirectPush(Scenario):
         """Distance of a point from the robot's first axis along the bearing [m]."""
         return float((point - BASE) @ self.u)
 
-    @property
+    @cached_property
     def outline(self) -> Outline:
         """Outline of the target."""
         return corners(self.at(self.distance), self.turn, [self.edge] * 3)
 
-    @property
+    @cached_property
     def zone_outline(self) -> Outline:
         """Outline of the zone."""
         return corners(self.at(self.distance + self.way), self.angle, [ZONE_SIZE] * 3)
 
-    @property
+    @cached_property
     def lane(self) -> Outline:
         """Area in which the chain is built and the hand comes down: open fingers need 40 mm on either side."""
         near, far = self.behind, CHAIN_DISTANCE + self.edge / 2
         return corners(self.at((near + far) / 2), self.angle, [far - near, self.edge + 2 * 0.040])
 
-    @property
+    @cached_property
     def behind(self) -> float:
         """Distance from the robot's first axis at which the hand comes down behind the chain [m]."""
         return CHAIN_DISTANCE - (self.needed - 1) * self.pitch - self.edge / 2 - APPROACH_DISTANCE
 
-    @property
+    @cached_property
     def out_of_touch(self) -> float:
         """Least distance of the gripper from the target in any posture [m]; not positive if it may touch."""
         middle = self.at(self.distance) + self.edge / 2 * UP

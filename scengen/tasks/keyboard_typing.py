@@ -33,6 +33,7 @@ Decisions, where the paper (App. B, M02) is silent, or contradicts itself (one a
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import mujoco
@@ -313,7 +314,7 @@ class KeyboardTyping(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def letters(self) -> str:
         """The word."""
         return WORDS[self.word]
@@ -322,7 +323,7 @@ class KeyboardTyping(Scenario):
         """Whether a place of the word is the agent's."""
         return bool(self.mine >> k & 1)
 
-    @property
+    @cached_property
     def own(self) -> list[int]:
         """The agent's places."""
         return [k for k in range(len(self.letters)) if self.owns(k)]
@@ -338,7 +339,7 @@ class KeyboardTyping(Scenario):
         pauses = (self.first_pause, self.second_pause, self.third_pause)
         return pauses[len(starts) - 1] if starts[-1] == k and len(starts) <= len(pauses) else 0.0
 
-    @property
+    @cached_property
     def spot(self) -> Vec3:
         """Initial position of the keyboard [m]."""
         return np.array([self.x, self.y, TABLE_TOP])

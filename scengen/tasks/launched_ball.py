@@ -12,6 +12,7 @@ The means are the plan of the paper: position the gripper at the predicted place
 import abc
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -210,23 +211,23 @@ class LaunchedBall(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def closing_time(self) -> float:
         """Time from the command until the jaw touches the ball [s]."""
         return jaw.time_to_touch(2 * self.ball.radius)
 
-    @property
+    @cached_property
     def grip(self) -> float:
         """Height of the grip site when the hand takes the ball [m]: finger tips over the floor, palm over the ball."""
         centre, palm = self.ball.radius, 2 * self.ball.radius - jaw.PALM_ABOVE
         return self.floor + max(centre, palm + MIN_CLEARANCE, jaw.TIP_BELOW + MIN_CLEARANCE)
 
-    @property
+    @cached_property
     def floor(self) -> float:
         """Height of the surface on which the ball lies [m]."""
         return TABLE_TOP
 
-    @property
+    @cached_property
     def parked_hand(self) -> Vec3:
         """Place where the hand waits until the ball rolls [m]."""
         return PARKED_HAND

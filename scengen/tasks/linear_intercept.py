@@ -31,6 +31,7 @@ Decisions, where the paper (App. B, T12) is silent:
 import math
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -281,12 +282,12 @@ class LinearIntercept(LaunchedBall):
     def travel_time(self, hand: Vec3, at: Vec3, turn: float) -> float:
         return max(math.dist(at, hand) / HAND_SPEED, turn / HAND_TURN_RATE) + LOW_SETTLING_TIME
 
-    @property
+    @cached_property
     def lead(self) -> float:
         """Time by which the hand must be at its place before it closes, so that it waits when the ball is near [s]."""
         return NEAR_DISTANCE / self.speed - self.closing_time + LEAD_TIME
 
-    @property
+    @cached_property
     def parked_hand(self) -> Vec3:
         """Place low over the table, beyond its middle, where the hand waits until the ball rolls [m]."""
         beyond = (1.0 + PARKED_SHARE) * PARKED_HAND - PARKED_SHARE * self.start
@@ -300,12 +301,12 @@ class LinearIntercept(LaunchedBall):
     def start(self) -> Vec3:
         return np.array([self.x, self.y, self.floor + self.ball.radius])
 
-    @property
+    @cached_property
     def deceleration(self) -> float:
         """Deceleration by rolling resistance [m/s^2]."""
         return rolling_deceleration(self.rolling)
 
-    @property
+    @cached_property
     def distance_to_edge(self) -> float:
         """Length of its path on the table [m]."""
         return min(
@@ -314,7 +315,7 @@ class LinearIntercept(LaunchedBall):
             if abs(along) > 1e-9
         )
 
-    @property
+    @cached_property
     def middle_miss(self) -> float:
         """Distance at which its path passes the middle of the table [m], signed."""
         return float(self.u[0] * self.start[1] - self.u[1] * self.start[0])

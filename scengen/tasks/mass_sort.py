@@ -24,7 +24,7 @@ Decisions where the paper is silent:
 import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations, pairwise, permutations
 
 import mujoco
@@ -37,7 +37,7 @@ from ..decisions import Decision, choice
 from ..geometry import UP, Outline, Vec3, corners, gap, least_gap
 from ..means import Mean, when
 from ..params import Bounded, param
-from ..predicates import borne, fallen, held, rests_on, still
+from ..predicates import borne, fallen, held, over, rests_on, still
 from ..robots.jaw import OPEN_GAP, SPAN
 from ..scenario import (
     Action,
@@ -109,7 +109,7 @@ class MassSort(Scenario):
         scene = table()
         remember(scene, *(f"lifted_{cube}" for cube in self.cubes))
         for rank in range(CUBE_COUNT):
-            place(scene, replace(self.zone, label=rank + 1), f"zone_{rank}", self.zone_at(rank), free=False)
+            place(scene, replace(self.zone, label=rank + 1), f"zone_{rank}", self.zones[rank], free=False)
         for cube, spot, rank in zip(self.cubes, self.spots, self.ranks, strict=True):
             box = Cube(edge=self.edge, friction=self.friction, mass=self.masses[rank])
             place(scene, box, cube, [spot.x, spot.y, TABLE_TOP], math.radians(spot.yaw))
@@ -124,9 +124,9 @@ class MassSort(Scenario):
         )
 
     def failure(self, world: World) -> str | None:
-        for cube, rank in self.belongs(world).items():
-            if self.zone_of(world, cube) not in (None, rank):
-                return "a cube was put into a wrong zone"
+        zones = {cube: self.zone_of(world, cube) for cube in self.cubes}
+        if any(zone is not None and zone != self.belongs(world)[cube] for cube, zone in zones.items()):
+            return "a cube was put into a wrong zone"
         return "a cube fell off the table" if fallen(world, *self.cubes) else None
 
     def means(self) -> Mapping[str, Mean]:
@@ -160,8 +160,9 @@ class MassSort(Scenario):
 
     def zone_of(self, world: World, cube: str) -> int | None:
         """Rank of the zone in which a cube has been released, or None."""
-        released = world.touching(cube, "table") and not world.touching(ROBOT, cube)
-        return next((rank for rank in range(CUBE_COUNT) if released and self.within(world, cube, rank)), None)
+        if not world.touching(cube, "table") or world.touching(ROBOT, cube):
+            return None
+        return next((rank for rank in range(CUBE_COUNT) if self.within(world, cube, rank)), None)
 
     def belongs(self, world: World) -> dict[str, int]:
         """Rank of each cube, by its mass in the scene."""
@@ -170,8 +171,7 @@ class MassSort(Scenario):
 
     def within(self, world: World, cube: str, rank: int) -> bool:
         """Whether the middle of a cube is over the zone of a rank."""
-        offset = np.abs(world.com(cube) - self.zone_at(rank))[:2]
-        return bool((offset <= self.zone.size / 2).all())
+        return over(world, cube, self.zones[rank], self.zone.size / 2)
 
     # --- oracle ---------------------------------------------------------------------------
 
@@ -210,7 +210,7 @@ class MassSort(Scenario):
 
     def place_held(self, world: World, cube: str, rank: int) -> Plan:
         """Put the held cube into the zone of a rank."""
-        middle = self.zone_at(rank) + self.edge / 2 * UP
+        middle = self.zones[rank] + self.edge / 2 * UP
         yield from put(world.arm, cube, middle, on="table", hover=self.edge + CARRY_HEIGHT)
         yield from retreat(world.arm, self.edge + APPROACH_HEIGHT)
 
@@ -302,7 +302,7 @@ class MassSort(Scenario):
         )
         yield require(self.order != 0, "the cubes lie in the order in which they belong", order=self.order)
         yield require(self.edge + 0.008 <= OPEN_GAP, "the jaw cannot take a cube", edge=self.edge, opening=OPEN_GAP)
-        squares = [corners(self.zone_at(rank), 0.0, [self.zone.size] * 2) for rank in range(CUBE_COUNT)]
+        squares = [corners(self.zones[rank], 0.0, [self.zone.size] * 2) for rank in range(CUBE_COUNT)]
         yield on_table("a cube or a zone", [*self.outlines, *squares])
         room = least_gap([square] for square in squares) + self.zone.size - self.edge
         yield require(room >= self.hand_beside, "the hand has no room between the zones", room=room)
@@ -312,7 +312,7 @@ class MassSort(Scenario):
         yield require(away >= MIN_CLEARANCE, "a cube lies in a zone, or too near to one", away=away)
         above = (2 * self.edge + CARRY_HEIGHT) * UP
         yield within_reach("a cube", *(np.array([spot.x, spot.y, TABLE_TOP]) + above for spot in self.spots))
-        yield within_reach("a zone", *(self.zone_at(rank) + above for rank in range(CUBE_COUNT)))
+        yield within_reach("a zone", *(self.zones[rank] + above for rank in range(CUBE_COUNT)))
 
     def features(self) -> Mapping[str, float]:
         """Least ratio of masses, largest mass [kg], number of pairs in wrong order, clearance in the jaw, side."""
@@ -329,47 +329,48 @@ class MassSort(Scenario):
             "light_zone": "on the robot's right" if self.mirrored else "on the robot's left",
             "far_row": "the zones" if self.zones_x > max(spot.x for spot in self.spots) else "the cubes",
             "edge": self.edge,
-            "apart": math.dist(self.zone_at(1)[:2], (self.spots[1].x, self.spots[1].y)),
+            "apart": math.dist(self.zones[1][:2], (self.spots[1].x, self.spots[1].y)),
         }
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def masses(self) -> tuple[float, float, float]:
         """Masses by rank [kg]."""
         return self.light, self.middle, self.heavy
 
-    @property
+    @cached_property
     def ranks(self) -> tuple[int, ...]:
         """Ranks of the cubes, from left to right."""
         return ORDERS[self.order]
 
-    @property
+    @cached_property
     def by_common_masses(self) -> tuple[int, ...]:
         """Ranks that cubes of these masses have in training, where the middle one is between 75 and 150 g."""
         return tuple(sum(self.masses[rank] > limit for limit in (0.075, 0.150)) for rank in self.ranks)
 
-    @property
+    @cached_property
     def cubes(self) -> tuple[str, ...]:
         """Names of the cubes, from left to right, independent of their masses."""
         return tuple(f"cube_{k}" for k in range(CUBE_COUNT))
 
-    @property
+    @cached_property
     def spots(self) -> tuple[Spot, ...]:
         """Poses of the cubes at the start, from left to right."""
         return self.first, self.second, self.third
 
-    @property
+    @cached_property
     def outlines(self) -> list[Outline]:
         """Outlines of the cubes at the start [m]."""
         return [corners([s.x, s.y], math.radians(s.yaw), [self.edge] * 2) for s in self.spots]
 
-    @property
+    @cached_property
     def hand_beside(self) -> float:
         """Distance beside a cube that the open jaw needs to grasp it [m]."""
         return (SPAN - self.edge) / 2 + MIN_CLEARANCE
 
-    def zone_at(self, rank: int) -> Vec3:
-        """Middle of the zone of a rank [m]; the first zone is on the left, or on the right if mirrored."""
-        side = (1 - rank) * (-1 if self.mirrored else 1)
-        return np.array([self.zones_x, side * self.zones_apart, TABLE_TOP])
+    @cached_property
+    def zones(self) -> tuple[Vec3, ...]:
+        """Middles of the zones by rank [m]; the first zone is on the left, or on the right if mirrored."""
+        sides = ((1 - rank) * (-1 if self.mirrored else 1) for rank in range(CUBE_COUNT))
+        return tuple(np.array([self.zones_x, side * self.zones_apart, TABLE_TOP]) for side in sides)

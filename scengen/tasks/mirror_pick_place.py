@@ -36,6 +36,7 @@ random grasps among them, solve half of the scenes: the task's question does not
 import math
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -148,7 +149,7 @@ class MirrorPickPlace(Scenario):
             yield from go_to(arm, at + APPROACH_HEIGHT * UP, turned, FINE, OPEN)
         return max(faces, key=lambda normal: abs(float(normal @ arm.hand_rot[:, 0])))
 
-    @property
+    @cached_property
     def _grip_above(self) -> float:
         """Height of the grip site over the cube's foot in the grasp [m]."""
         # Held above its middle (65 %) the cube hangs straight: below, only the edges of the pads would keep it from
@@ -256,7 +257,7 @@ class MirrorPickPlace(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def spot(self) -> Vec3:
         """Initial position of the middle of the cube's foot [m]."""
         return np.array([self.x, self.y, TABLE_TOP])

@@ -132,7 +132,7 @@ class OccluderPush(Scenario):
             return all(math.hypot(away[0], away[1]) > reach for away in lids)
 
         def strays(world: World) -> bool:
-            others = (cube for cube in self.cubes if cube != red(world))
+            others = set(self.cubes) - {red(world)}
             return any(world.touching(cube, "table") and self.on_patch(world, cube) for cube in others)
 
         return {
@@ -310,17 +310,17 @@ class OccluderPush(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @functools.cached_property
     def spots(self) -> tuple[Spot, ...]:
         """Places of the cubes, from left to right."""
         return self.left, self.middle, self.right
 
-    @property
+    @functools.cached_property
     def cubes(self) -> tuple[str, ...]:
         """Names of the cubes, from left to right, independent of their colours."""
         return tuple(f"cube_{i}" for i in range(CUBE_COUNT))
 
-    @property
+    @functools.cached_property
     def goal(self) -> Vec3:
         """Middle of the patch [m]."""
         return np.array([self.patch_x, self.patch_y, TABLE_TOP])
@@ -329,17 +329,17 @@ class OccluderPush(Scenario):
         """Initial position of the middle of a cube's foot [m]."""
         return np.array([self.spots[i].x, self.spots[i].y, TABLE_TOP])
 
-    @property
+    @functools.cached_property
     def lid_outlines(self) -> list[Outline]:
         """Outlines of the lids at the start [m]."""
         return [corners([s.x, s.y], math.radians(s.yaw), [self.lid.width] * 2) for s in self.spots]
 
-    @property
+    @functools.cached_property
     def patch_outline(self) -> Outline:
         """Outline of the patch [m]."""
         return corners(self.goal, 0.0, [self.patch.size] * 2)
 
-    @property
+    @functools.cached_property
     def hiding_margin(self) -> float:
         """Least distance from a lid's edge at which a camera's line of sight to a cube's foot meets the lid [m]."""
         least = math.inf
@@ -352,7 +352,7 @@ class OccluderPush(Scenario):
                 least = min(least, float(inside))
         return least
 
-    @property
+    @functools.cached_property
     def directions(self) -> tuple[Vec3, ...]:
         """Direction in which each lid is pushed: the first normals of their sides with clearance for all three.
 

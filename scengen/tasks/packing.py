@@ -342,7 +342,7 @@ class Packing(Scenario):
         sides = [self.unit * float(side) - 2 * self.clearance for side in slot.sides]
         return LPiece.of(sides, self.thickness, self.density, rgba)
 
-    @property
+    @cached_property
     def spots(self) -> tuple[Spot, ...]:
         return (self.spot_0, self.spot_1, self.spot_2, self.spot_3)[: self.count]
 

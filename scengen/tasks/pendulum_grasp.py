@@ -35,6 +35,7 @@ Decisions, where the paper (App. B, T11) says "grasp the bob at the swing apex" 
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -333,33 +334,33 @@ class PendulumGrasp(Scenario):
         below = abs(angle) < math.radians(4.0)
         return "below the axle" if below else spoken(self.plane + (0.0 if angle > 0.0 else 180.0))
 
-    @property
+    @cached_property
     def peak_angle(self) -> float:
         """Amplitude of the swing [rad]."""
         return math.radians(self.amplitude)
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Period of the swing [s]."""
         return self.pendulum.period(self.peak_angle)
 
-    @property
+    @cached_property
     def closing_time(self) -> float:
         """Time from the command until the jaw touches the bob [s]."""
         return jaw.time_to_touch(2 * self.pendulum.radius)
 
-    @property
+    @cached_property
     def window(self) -> float:
         """Time for which the bob is at a turning point [s]."""
         from_apex = APEX_SHARE * self.peak_angle
         return 2 * self.pendulum.until_turning(from_apex, self.pendulum.rate(self.peak_angle, from_apex), 1)
 
-    @property
+    @cached_property
     def foot(self) -> Vec3:
         """Point on the table below the axle [m]."""
         return np.array([self.pivot_x, self.pivot_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def grasp_rot(self) -> Mat3:
         """Orientation of the hand that grasps the bob: it looks along the plane of the swing, and closes across it."""
         return self.rot_beside(self.peak_angle)

@@ -293,12 +293,12 @@ class PickPlaceYcb(Scenario):
     def material(self) -> str:
         return self.thing.scan.sha256 if self.thing.scan else ""
 
-    @property
+    @functools.cached_property
     def start(self) -> Vec3:
         """Initial position of the object's foot [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
-    @property
+    @functools.cached_property
     def planned(self) -> tuple[Jump, ...]:
         """Jumps that happen, in their order."""
         return (self.jump_0, self.jump_1, self.jump_2, self.jump_3, self.jump_4)[: self.jumps]

@@ -13,6 +13,7 @@
 import math
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import cached_property
 from typing import Generic, TypeVar
 
 import mujoco
@@ -76,7 +77,7 @@ class PlateAndSlot(Scenario, Generic[PlateT]):
     def build(self) -> mujoco.MjSpec:
         return self._scene(self.plate, self.shelf)
 
-    @property
+    @cached_property
     def shelf(self) -> SlotShelf:
         """Shelf that fits the plate."""
         height = 2 * self.plate.radius - self.proud
@@ -264,17 +265,17 @@ class PlateAndSlot(Scenario, Generic[PlateT]):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def side(self) -> float:
         """Side on which the plate is taken: 1 by the left arm, -1 by the right one."""
         return 1.0
 
-    @property
+    @cached_property
     def outside(self) -> Vec3:
         """Level unit vector to the side on which the plate is taken."""
         return self.side * LEFT
 
-    @property
+    @cached_property
     def flat_tilt(self) -> float:
         """Least tilt of a hand whose finger tips hold the rim of the lying plate [rad]."""
         return steepness(self.plate.rise + self.plate.thickness / 2, PALM_ABOVE + TIP_BELOW)
@@ -294,21 +295,21 @@ class PlateAndSlot(Scenario, Generic[PlateT]):
         height = self.plate.rise + self.plate.thickness / 2
         return world.pos("plate") + height * world.rot("plate")[:, 2] + self.plate.radius * self.outwards(world)
 
-    @property
+    @cached_property
     def slack(self) -> float:
         """Width of the slot beyond the plate's height [m]."""
         return self.gap - self.plate.height
 
-    @property
+    @cached_property
     def start(self) -> Vec3:
         """Initial position of the plate [m]."""
         return np.array([self.plate_x, self.plate_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def foot(self) -> Vec3:
         """Position of the shelf on the table [m]."""
         return np.array([self.shelf_x, self.shelf_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def _shelf_outline(self) -> Outline:
         return corners(self.foot, math.radians(self.shelf_yaw), (self.shelf.width, self.shelf.long))

@@ -34,6 +34,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -79,7 +80,7 @@ class PlateShelf(PlateAndSlot[Plate]):
     gap: float = param(0.034, "m", 0.02, 0.09)  # width of the slot
     proud: float = param(0.0, "m", -0.01, 0.1)  # height by which the plate stands out of the slot
 
-    @property
+    @cached_property
     def shelf(self) -> SlotShelf:
         return replace(super().shelf, ends=0.018)  # walls as thick as the dividers close the slot's ends
 

@@ -33,6 +33,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -319,12 +320,12 @@ class PlateShelfHobi(PlateAndSlot[Dish]):
 
     # --- geometry of the hand over the rim --------------------------------------------------
 
-    @property
+    @cached_property
     def side(self) -> float:
         """Side on which the plate is taken, the shelf's: 1 by the left arm, -1 by the right one."""
         return math.copysign(1.0, self.shelf_y)
 
-    @property
+    @cached_property
     def raised_tilt(self) -> float:
         """Tilt of the hand that takes the raised rim [rad]: along the rim, or steeper if the palm needs it."""
         height = self.plate.raised + self.plate.thickness / 2 - PALM_CLEARANCE

@@ -112,13 +112,13 @@ class RampSort(Scenario):
             let_pass(scene.body(f"ball_{i}"))
         return scene
 
-    @property
+    @cached_property
     def barrier(self) -> Barrier:
         """A barrier from the upper half of the ramp to the far ends of the bins, lower than the hand after a reset."""
         end = self.ramp.length / 2 + BIN_GAP + BIN_LENGTH + BIN_WALL
         return Barrier(length=end - BARRIER_START, width=2 * self._half_width, height=0.18)
 
-    @property
+    @cached_property
     def box(self) -> Bin:
         """Low walls around a row of balls."""
         length = (self.reds + self.blues - 1) * ROW_PITCH + 2 * self.ball.radius + 0.02
@@ -156,14 +156,15 @@ class RampSort(Scenario):
     def means(self) -> Mapping[str, Mean]:
         def each(holds: Callable[[World, int, float, float], bool]) -> Mean:
             def hold(world: World) -> bool:
-                places = ((world.com(f"ball_{i}") - self.middle) @ self.axes for i in range(len(self.colours)))
-                return all(holds(world, i, along, across) for i, (along, across, _) in enumerate(places))
+                return all(holds(world, i, *self.place_of(world, i)[:2]) for i in range(len(self.colours)))
 
             return throughout(hold)
 
         def own_side(world: World, i: int, along: float, across: float) -> bool:
+            if "ramp" not in world.touching_bodies(f"ball_{i}"):
+                return True
             side = self._red_side(world) if self.colours[i] else -self._red_side(world)
-            return side * (across - self.ramp.ridge) > 0.0 or "ramp" not in world.touching_bodies(f"ball_{i}")
+            return side * (across - self.ramp.ridge) > 0.0
 
         def laid(world: World, i: int, along: float, across: float) -> bool:
             over = abs(along) < self.ramp.length / 2 and abs(across) < self._half_width
@@ -171,9 +172,9 @@ class RampSort(Scenario):
             return not flies or still(world, f"ball_{i}", MAX_FLIGHT_SPEED)
 
         def rolls(world: World, i: int, along: float, across: float) -> bool:
-            carried = self.high_over_ramp(world, i) or world.touching(ROBOT, f"ball_{i}")
             past = along > BARRIER_START and abs(across) < self._half_width + self.ball.radius
-            return not (past and carried) and (not self.arrived(world, i) or world.touched(f"ball_{i}", "ramp"))
+            carried = past and (world.touching(ROBOT, f"ball_{i}") or self.high_over_ramp(world, i))
+            return not carried and (not self.arrived(world, i) or world.touched(f"ball_{i}", "ramp"))
 
         return {
             "each ball touched the ramp on the side of its colour alone": each(own_side),
@@ -181,16 +182,21 @@ class RampSort(Scenario):
             "each ball came over the lower half of the ramp by itself": each(rolls),
         }
 
+    def place_of(self, world: World, i: int) -> tuple[float, float, float]:
+        """Place of a ball from `middle`: along the ramp, across it, and upwards [m]."""
+        along, across, height = ((world.com(f"ball_{i}") - self.middle) @ self.axes).tolist()
+        return along, across, height
+
     def arrived(self, world: World, i: int) -> int:
         """Side of the bin that a ball is in; 0 while it is in none."""
-        along, across, height = (world.com(f"ball_{i}") - self.middle) @ self.axes
+        along, across, height = self.place_of(world, i)
         if height > BIN_RIM or abs(along - self._bins_along) > BIN_LENGTH / 2 or abs(across) > self._half_width:
             return 0
         return 1 if across > self.ramp.ridge else -1
 
     def high_over_ramp(self, world: World, i: int) -> bool:
         """Whether a ball is past the start of the barrier, and its centre 2 r + 1 cm or more above the ramp there."""
-        along, across, height = (world.com(f"ball_{i}") - self.middle) @ self.axes
+        along, across, height = self.place_of(world, i)
         if along < BARRIER_START or abs(across) > self._half_width + self.ball.radius:
             return False
         rim = self.ramp.width / 2
@@ -364,7 +370,7 @@ class RampSort(Scenario):
         ways = list(itertools.combinations(places, self.reds))
         return tuple(i in ways[self.arrangement % len(ways)] for i in places)
 
-    @property
+    @cached_property
     def band(self) -> float:
         """Half width of the band at the ridge in which the side of a ball is not certain [m]."""
         return self.ball.radius * math.sin(math.radians(self.ramp.lean)) + 0.004
@@ -374,7 +380,7 @@ class RampSort(Scenario):
         """Axes of the ramp: down along the ridge, to the left of it, up."""
         return about_z(self._yaw)
 
-    @property
+    @cached_property
     def _yaw(self) -> float:
         """Direction in which balls roll [rad]."""
         return math.pi / 2 + math.radians(self.ramp_yaw)
@@ -415,7 +421,7 @@ class RampSort(Scenario):
         """Offset of the release from the ridge, not beyond the middle of the slab [m]."""
         return side * min(0.035, abs(side * self.ramp.width / 2 - self.ramp.ridge) / 2)
 
-    @property
+    @cached_property
     def outlines(self) -> tuple[Outline, Outline]:
         """Outlines of the ramp with its bins, and of the palm at all places where it takes a ball from the box [m]."""
         start, end = -self.ramp.length / 2, self._bins_along + BIN_LENGTH / 2 + BIN_WALL

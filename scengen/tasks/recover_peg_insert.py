@@ -40,6 +40,7 @@ line. This corrects a peg that sits askew in the jaw, a board that has turned, a
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -341,34 +342,34 @@ class RecoverPegInsert(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def foot(self) -> Vec3:
         """Initial position of the peg's foot [m]."""
         return np.array([self.peg_x, self.side * self.peg_y, TABLE_TOP + Plinth().height])
 
-    @property
+    @cached_property
     def mouth(self) -> Vec3:
         """Point on the table below the middle of the mouth, at the start [m]."""
         return np.array([self.mouth_x, self.side * self.mouth_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def u(self) -> Vec3:
         """Level unit vector into the slot at the start."""
         return heading(self.side * (90.0 - self.board_yaw))
 
-    @property
+    @cached_property
     def outlines(self) -> list[Outline]:
         """Outlines of the peg, and of the board before and after the turn."""
         pin, turned = self.mouth + self.board.pivot * self.u, self._azimuth + math.radians(self.turn)
         boards = [self.board.outline(pin, yaw) for yaw in (self._azimuth, turned)]
         return [corners(self.foot, self._peg_yaw, self.peg.size), *boards]
 
-    @property
+    @cached_property
     def _azimuth(self) -> float:
         """Azimuth of the slot at the start [rad]."""
         return polar(self.u)[0]
 
-    @property
+    @cached_property
     def _peg_yaw(self) -> float:
         """Yaw of the peg in the scene, mirrored or not [rad]."""
         return math.radians(self.side * self.peg_yaw)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Generic, TypeVar
 
 import mujoco
@@ -79,37 +80,37 @@ class RodAndRidge(Scenario, Generic[RodT]):
         """Room between the pads of the jaw beyond the width of the rod [m]."""
         return world.arm.gap - self.rod.width
 
-    @property
+    @cached_property
     def start(self) -> Vec3:
         """Point of the table under the middle of the rod at the start [m]."""
         return np.array([self.rod_x, self.rod_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def foot(self) -> Vec3:
         """Point under the middle of the ridge [m]."""
         return np.array([self.ridge_x, self.ridge_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def top(self) -> Vec3:
         """Middle of the ridge's upper face [m]."""
         return self.foot + self.ridge.height * UP
 
-    @property
+    @cached_property
     def normal(self) -> Vec3:
         """Level unit vector across the ridge."""
         return heading(self.ridge_yaw + 90.0)
 
-    @property
+    @cached_property
     def outline(self) -> Outline:
         """Outline of the rod on the table [m]."""
         return corners(self.start, math.radians(self.rod_yaw), self.rod.size)
 
-    @property
+    @cached_property
     def hand_over_rod(self) -> Outline:
         """Outline of the palm over the rod, before it is lifted [m]."""
         return corners(self.start, math.radians(self.rod_yaw), [2 * PALM_ALONG, 2 * PALM_ACROSS])
 
-    @property
+    @cached_property
     def stand_outline(self) -> Outline:
         """Outline of the plate under the ridge [m]."""
         size = [self.ridge.length + 2 * PLATE_MARGIN, self.ridge.plate]

@@ -33,6 +33,7 @@ Decisions where the paper is silent (it gives the story, the 5 deg, the pivot of
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -156,7 +157,7 @@ class SeesawBalance(Scenario):
                 return
             low, high, along = self._narrowed(world, low, high)
 
-    @property
+    @cached_property
     def _ends(self) -> tuple[float, float]:
         """Ends of the raised arm between which the balancing place is [m]."""
         return self.nearest(self.raised, -1.0), self.nearest(self.raised, 1.0)
@@ -329,43 +330,43 @@ class SeesawBalance(Scenario):
         target = standing(self.target, self.offset)
         return self.seesaw.rest([target] if along is None else [target, standing(self.weight, along)])
 
-    @property
+    @cached_property
     def raised(self) -> int:
         """Arm that is up at the start and must carry the counterweight, -1 or 1."""
         return -1 if self.balance < 0 else 1
 
-    @property
+    @cached_property
     def balance(self) -> float:
         """Place at which the counterweight levels the deck exactly, along s [m]: m_w s_w = -(m_t s_t + m_b s_b)."""
         return -self.seesaw.moment([standing(self.target, self.offset)]) / self.weight.mass
 
-    @property
+    @cached_property
     def margin(self) -> float:
         """Distance from `balance` up to which the tilt stays within `MAX_TILT` [m]."""
         stiffness = self.seesaw.stiffness([standing(block, 0.0) for block in (self.target, self.weight)])
         return math.tan(MAX_TILT) * stiffness / self.weight.mass
 
-    @property
+    @cached_property
     def guess(self) -> float:
         """Place on the raised arm that would balance with `EXPECTED_MASSES`, as far as the arm reaches [m]."""
         return self.nearest(self.raised, with_values(self, EXPECTED_MASSES).balance)
 
-    @property
+    @cached_property
     def down(self) -> Mat3:
         """Orientation of a hand that closes along the axle, on faces that no tilt turns, far from joint 7's limits."""
         return facing_down(WRIST_MIDDLE + math.remainder(math.radians(self.heading) - WRIST_MIDDLE, math.pi))
 
-    @property
+    @cached_property
     def foot(self) -> Vec3:
         """Point on the table below the axle [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
-    @property
+    @cached_property
     def start(self) -> Vec3:
         """Foot of the counterweight on the table [m]."""
         return np.array([self.weight_x, self.weight_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def mirror(self) -> float:
         """Place opposite to the target, as far as the deck reaches [m]."""
         return self.nearest(-1 if self.offset > 0 else 1, -self.offset)

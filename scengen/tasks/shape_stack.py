@@ -71,7 +71,7 @@ class Place(Bounded):
     y: float = param(0.0, "m", -0.4, 0.4)
     yaw: float = param(0.0, "deg", -180.0, 180.0, period=360.0)
 
-    @property
+    @cached_property
     def spot(self) -> Vec3:
         """Position of the foot of a shape that stands here [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
@@ -293,12 +293,12 @@ class ShapeStack(Scenario):
         found.insert(self.cone_at, cone)
         return {f"shape_{k}": piece for k, piece in enumerate(found)}
 
-    @property
+    @cached_property
     def flat(self) -> tuple[Shape, ...]:
         """The shapes other than the cone."""
         return self.cube, self.cylinder, self.hexagon, self.prism
 
-    @property
+    @cached_property
     def cone_spot(self) -> Vec3:
         """Position of the foot of the pointed shape that comes last [m]."""
         return self.foot(self.order[-1])

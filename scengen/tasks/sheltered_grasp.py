@@ -38,6 +38,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import cast
 
 import mujoco
@@ -317,37 +318,37 @@ class ShelteredGrasp(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def _max_along(self) -> float:
         """Largest distance from the middle of the open side at which the hand can enter [m]."""
         return self.rack.width / 2 - PALM_ALONG - MIN_CLEARANCE
 
-    @property
+    @cached_property
     def turn(self) -> float:
         """Yaw of the rack [rad]; at 0 it opens towards -y."""
         return math.radians(self.rack_yaw if self.side > 0 else 180.0 - self.rack_yaw)
 
-    @property
+    @cached_property
     def _azimuth(self) -> float:
         """Azimuth of a hand that enters the rack straight [rad], between -pi and pi."""
         return math.remainder(self.turn + math.pi / 2, math.tau)
 
-    @property
+    @cached_property
     def entry(self) -> Mat3:
         """Orientation of a level hand that enters the rack straight."""
         return facing(self._azimuth, 0.0)
 
-    @property
+    @cached_property
     def foot(self) -> Vec3:
         """Position of the rack's foot [m]."""
         return np.array([self.rack_x, self.side * self.rack_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def tray(self) -> Vec3:
         """Position of the tray's foot [m]."""
         return np.array([self.tray_x, self.side * self.tray_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def thing(self) -> Box:
         """The object in the rack; the y axis of its body points away from the open side."""
         return self.cube if self.item == 0 else PUDDING_BOX
@@ -362,12 +363,12 @@ class ShelteredGrasp(Scenario):
         cos, sin, y = abs(math.cos(turn)), abs(math.sin(turn)), min(most, y)
         return cos * x + sin * y, sin * x + cos * y
 
-    @property
+    @cached_property
     def middle_depth(self) -> float:
         """Distance of the object's middle behind the open side [m]."""
         return self.depth + float(self.thing.size[1]) / 2
 
-    @property
+    @cached_property
     def lever(self) -> float:
         """Distance from the grip site to the object's middle, which is beyond it in a long object [m]."""
         return max(0.0, float(self.thing.size[1]) / 2 - GRIP_DEPTH)
@@ -399,7 +400,7 @@ class ShelteredGrasp(Scenario):
         one, other = met @ normals.T, opening @ normals.T
         return float(np.maximum(one.min(0) - other.max(0), other.min(0) - one.max(0)).max())
 
-    @property
+    @cached_property
     def outlines(self) -> tuple[Outline, Outline]:
         """Outlines of the rack and of the tray."""
         return corners(self.foot, self.turn, self.rack.outer), corners(self.tray, 0.0, TRAY.outer)

@@ -31,6 +31,7 @@ Decisions where the paper (App. B, T15) is silent:
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, pairwise, permutations
 
 import mujoco
@@ -325,7 +326,7 @@ class SlideCatch(Scenario):
 
     # --- mechanics ------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def ramp(self) -> LoadedIncline:
         """The ramp in its place, the blocks in its lanes, and its tilt."""
         foot, rate = np.array([self.x, self.y, TABLE_TOP]), math.radians(self.rate)
@@ -343,13 +344,13 @@ class SlideCatch(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def loads(self) -> tuple[Load, ...]:
         """Blocks by lane, from the left."""
         by_place = dict(zip(ORDERS[self.order], (self.low, self.middle, self.high), strict=True))
         return tuple(by_place[lane] for lane in range(BLOCK_COUNT))
 
-    @property
+    @cached_property
     def blocks(self) -> tuple[str, ...]:
         """Names of the blocks by lane; they reveal no friction."""
         return tuple(f"block_{lane}" for lane in range(BLOCK_COUNT))

@@ -37,6 +37,7 @@ and "sliding the object is not allowed":
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -367,17 +368,17 @@ class SlipRecovery(Scenario):
     def material(self) -> str:
         return self.thing.scan.sha256 if self.thing.scan else ""
 
-    @property
+    @cached_property
     def start(self) -> Vec3:
         """Initial position of the object's foot [m]."""
         return np.array([self.x, self.y, TABLE_TOP])
 
-    @property
+    @cached_property
     def goal(self) -> Vec3:
         """Middle of the region [m]."""
         return np.array([self.goal_x, self.goal_y, TABLE_TOP])
 
-    @property
+    @cached_property
     def planned(self) -> tuple[Slip, ...]:
         """Slips that happen, in their order."""
         return (self.slip_0, self.slip_1, self.slip_2)[: self.slips]

@@ -34,7 +34,7 @@ oracle places it within 3 mm. Each finger has 12 mm of clearance beside a cube.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations, pairwise
 
 import mujoco
@@ -276,23 +276,23 @@ class StackCollapseRecovery(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def cubes(self) -> dict[str, Cube | LoadedCube]:
         """Cubes by name, from the lowest up."""
         return dict(zip(NAMES, (self.bottom, self.middle, self.top), strict=True))
 
-    @property
+    @cached_property
     def edges(self) -> dict[str, float]:
         """Edges of the cubes by name [m]."""
         return {name: cube.edge for name, cube in self.cubes.items()}
 
-    @property
+    @cached_property
     def feet(self) -> list[Vec3]:
         """Initial position of each cube's foot [m]."""
         heights = np.cumsum([0.0, self.bottom.edge, self.middle.edge])
         return [np.array([self.x, self.y, TABLE_TOP + height]) for height in heights]
 
-    @property
+    @cached_property
     def planned(self) -> tuple[Blow, ...]:
         """Blows that come, in their order."""
         return (self.blow_0, self.blow_1)[: self.blows]

@@ -25,7 +25,7 @@ guess. A hook that falls off the table may have done its work before.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import mujoco
 import numpy as np
@@ -279,13 +279,13 @@ class ToolRetrieve(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def spot(self) -> Vec3:
         """Initial position of the cube's foot [m]."""
         away = self.distance * heading(self.bearing)
         return np.array([BASE[0] + away[0], BASE[1] + away[1], TABLE_TOP])
 
-    @property
+    @cached_property
     def tool(self) -> Hook:
         """Hook of its kind, with the handle of `hook`."""
         hook = self.hook
@@ -306,23 +306,23 @@ class ToolRetrieve(Scenario):
             return THook(length=hook.length, tip=hook.tip, width=width, height=height, mass=mass, friction=friction)
         return hook
 
-    @property
+    @cached_property
     def half(self) -> float:
         """Half the cube's edge [m]."""
         return self.cube.edge / 2
 
-    @property
+    @cached_property
     def out_of_touch(self) -> float:
         """Least distance of the gripper from the cube in any posture [m]; not positive if it may touch."""
         turn = about_z(math.radians(self.cube_yaw))
         return ik.box_shortfall(self.spot + self.half * UP, turn, self.half, ik.GRIPPER_REACH)
 
-    @property
+    @cached_property
     def stretch(self) -> float:
         """Distance from the grip on the handle to the face that pulls [m]."""
         return shortest_stretch(self.tool, self._behind)
 
-    @property
+    @cached_property
     def _behind(self) -> float:
         """Distance from the robot's first axis at which the pulling face is behind the cube, for any yaw of the cube
         [m]."""

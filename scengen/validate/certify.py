@@ -19,12 +19,11 @@ from ..sim import scene_text
 from ..sim.embodiment import JAW, action_size
 from ..sim.world import World
 from .impaired import held, impaired, posed
-from .rollout import AT_REST, Jitter, Rollout, replay, run, try_shortcut
-from .settings import QUICK, CertifySettings
-from .settings import lower_bound as lower_bound  # for those that judge rates
+from .rollout import AT_REST, Jitter, Rollout, go_on, replay, run, still_moving, try_shortcut
+from .settings import QUICK, CertifySettings, Robust, lower_bound
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Certified:
     """A certificate with the scene and the witness that it is about. The scene is empty if it was never built."""
 
@@ -33,6 +32,11 @@ class Certified:
     witness: Actions
     digest: str
     """Hash of the physics state at the end of the witness."""
+
+    def __repr__(self) -> str:
+        made = [check.passed for check in self.certificate.checks if check.passed is not None]
+        checks = f"{sum(made)} of {len(made)} checks passed"
+        return f"Certified({self.certificate.verdict}: {checks}, witness of {len(self.witness)} actions)"
 
     def _repr_html_(self) -> str:
         """Its checks, in a notebook."""
@@ -49,6 +53,7 @@ def certify(
     embodiment: str = JAW,
     last: str | None = None,
     adversary: "Adversary | None" = None,
+    to_the_end: bool = False,
 ) -> Certified:
     """Run every check on a scenario, cheap ones first, until one fails.
 
@@ -59,6 +64,7 @@ def certify(
         embodiment: the robot, one of `scengen.sim.embodiment.EMBODIMENTS`.
         last: the check after which to stop, if only this check is of interest; nothing is certified then.
         adversary: attacks the scenario if the settings request it: `scengen.attack.check.attacked`.
+        to_the_end: see `Trial`.
 
     Raises:
         BadConfig: the settings request an attack, and there is no adversary.
@@ -66,7 +72,7 @@ def certify(
     if settings.attack and adversary is None:
         what = f"certify.attack = {settings.attack}, but no adversary is given"
         raise BadConfig(f"{what}; pass adversary=scengen.attack.check.attacked")
-    trial = Trial(scenario, horizon, settings, embodiment, adversary)
+    trial = Trial(scenario, horizon, settings, embodiment, adversary, to_the_end)
     checks: list[Check] = []
     for name in CHECKS:
         failed = bool(checks) and checks[-1].passed is False
@@ -98,9 +104,20 @@ class Trial:
         settings: CertifySettings,
         embodiment: str,
         adversary: "Adversary | None" = None,
+        to_the_end: bool = False,
     ):
+        """
+        Args:
+            scenario: see `certify`.
+            horizon: see `certify`.
+            settings: see `certify`.
+            embodiment: see `certify`.
+            adversary: see `certify`.
+            to_the_end: whether rollouts go on after what a check asks is decided, as in certificates of earlier
+                releases: verdicts are the same, and some numbers differ.
+        """
         self.scenario, self.horizon, self.settings, self.embodiment = scenario, horizon, settings, embodiment
-        self.adversary = adversary
+        self.adversary, self.to_the_end = adversary, to_the_end
         self.text = ""
         """The scene, MJCF; empty before it compiles."""
         self.solution: Rollout | None = None
@@ -172,8 +189,9 @@ class Trial:
 
         start, self.solved_at_start = state()
         end, self.solved_after_rest = start, self.solved_at_start
-        episode, waiting = Episode(self.scenario, world), self.scenario.pending(world)
-        for _ in range(round(limits.seconds / Loop.PERIOD)):
+        episode, waiting = Episode(self.scenario, world, self.horizon, PAPER), self.scenario.pending(world)
+        self.rested = episode
+        for _ in range(self._resting_periods):
             if episode.step(world.received(world.idle)) == "unstable":
                 return asdict(limits), {}, episode.reason
             if waiting and not self.scenario.pending(world):
@@ -201,16 +219,26 @@ class Trial:
         return {}, {}, "the goal holds after settling" if self.solved_after_rest else ""
 
     def _idle(self) -> "Finding":
-        """Whether doing nothing reaches the goal in any way. It may end at rest, after the seconds of `rest`."""
+        """Whether doing nothing reaches the goal in any way. It may end at rest, after the seconds of `rest`.
+
+        The rollout of `rest` goes on, unless it was decided before its end.
+        """
 
         def wait(world: World) -> Plan:
-            yield from repeat(world.idle, round(self.settings.rest.seconds / Loop.PERIOD))
+            yield from repeat(world.idle, self._resting_periods - round(world.time / Loop.PERIOD))
 
-        episode = run(
-            self.scenario, self.world, wait, self.horizon, self.settings.settle, until_settled=True, rules=PAPER
-        )
+        settle = self.settings.settle
+        if self.rested.outcome is None:
+            episode = go_on(self.rested, wait, settle)
+        else:
+            episode = run(self.scenario, self.world, wait, self.horizon, settle, until_settled=True, rules=PAPER)
         settings = {"horizon": self.horizon}
         return settings, _outcome(episode), "doing nothing reaches the goal" if episode.solved else ""
+
+    @property
+    def _resting_periods(self) -> int:
+        """Number of control periods of the rest check."""
+        return round(self.settings.rest.seconds / Loop.PERIOD)
 
     def _solved(self) -> "Finding":
         episode = self._run(self.scenario.oracle)
@@ -220,26 +248,36 @@ class Trial:
         return {"horizon": self.horizon}, _outcome(episode), ""
 
     def _shortcuts(self) -> "Finding":
-        """Every tempting plan, through the teleoperation filter and without it, because a policy acts without it."""
+        """Every tempting plan, through the teleoperation filter and without it, because a policy acts without it.
+
+        The filtered one is played to its end and shows how it fails. The raw one ends when no goal counts any more, and
+        is not played if its actions are those of the filtered one.
+        """
         numbers: dict[str, dict[str, Any]] = {}
+        settle, shorten = self.settings.settle, not self.to_the_end
         for name, shortcut in self.scenario.shortcuts().items():
             numbers[name] = {}
+            tried: Rollout | None = None
             for how, raw in ACTIONS.items():
-                tried = try_shortcut(self.scenario, self.world, shortcut, self.horizon, self.settings.settle, raw)
+                if tried is None or tried.filtered:
+                    decided = raw and shorten
+                    tried = try_shortcut(self.scenario, self.world, shortcut, self.horizon, settle, raw, decided)
                 numbers[name][how] = _outcome_of_shortcut(tried)
                 if tried.solved:
                     return {}, numbers, f"{name!r} reaches the goal ({how})"
                 if tried.outcome == "unstable" or (shortcut.to_rest and tried.reason != AT_REST):
                     seen = "reaches the goal" if tried.lacks else "was not seen to its end"
-                    return {}, numbers, f"{name!r} {seen} ({how}): {tried.reason}"
+                    left = "" if tried.lacks else f"; still moving: {', '.join(still_moving(self.world)) or 'nothing'}"
+                    return {}, numbers, f"{name!r} {seen} ({how}): {tried.reason}{left}"
         return {}, numbers, ""
 
     def _robust(self) -> "Finding":
         limits = self.settings.robust
         size = asdict(limits)
         failures: list[str] = []
-        for k in range(limits.runs):
-            jitter = Jitter.within(limits, self.scenario.id, k)
+        played = 0
+        while played < limits.runs and (self.to_the_end or _can_reach(limits, len(failures))):
+            jitter = Jitter.within(limits, self.scenario.id, played)
             episode = run(
                 self.scenario,
                 jitter.disturbed(self.world, self.scenario.DISTURBED),
@@ -249,24 +287,32 @@ class Trial:
                 jitter,
             )
             if not episode.solved:
-                failures.append(f"run {k}: {episode.reason}")
-        solved = limits.runs - len(failures)
-        bound = lower_bound(solved, limits.runs)
-        numbers = {"runs": limits.runs, "solved": solved, "bound": bound, "failures": failures}
+                failures.append(f"run {played}: {episode.reason}")
+            played += 1
+        solved = played - len(failures)
+        bound = lower_bound(solved, played)
+        numbers = {"runs": played, "solved": solved, "bound": bound, "failures": failures}
         if bound >= limits.bound:
             return size, numbers, ""
         if failures:
-            return size, numbers, f"{solved} of {limits.runs} jittered runs succeed; {failures[0]}"
+            return size, numbers, f"{solved} of {played} jittered runs succeed; {failures[0]}"
         return size, numbers, f"{limits.runs} runs cannot show a bound of {limits.bound:g}; ask for more"
 
     def _numerics(self) -> "Finding":
-        """The witness with half the time step and with twice the iterations; if it fails, the oracle must succeed."""
+        """The witness with half the time step and with twice the iterations; if it fails, the oracle must succeed.
+
+        If the solver has converged in every step of the solution, more iterations give the same bits, and the same end.
+        """
         assert self.solution is not None
         half, patient = self._load(substeps=2 * self.world.loop.substeps), self._load()
         patient.model.opt.iterations *= 2
         numbers: dict[str, Any] = {}
         for name, world in {"half_time_step": half, "twice_the_iterations": patient}.items():
-            kept = replay(self.scenario, world, self.solution.actions, self.horizon, self.settings.settle)
+            if world is patient and self.solution.converged:
+                kept = self.solution
+            else:
+                witness, settle = self.solution.actions, self.settings.settle
+                kept = replay(self.scenario, world, witness, self.horizon, settle, until_settled=True)
             numbers[name] = {"witness": kept.outcome}
             if not kept.solved:
                 again = run(self.scenario, world, self.scenario.oracle, self.horizon, self.settings.settle)
@@ -340,6 +386,11 @@ NOT_TRIED = "not tried"
 def no_ablations(scenario: Scenario) -> str:
     """Reason in a certificate of a family that has no ablations."""
     return NOT_CHECKED + (scenario.NO_ABLATIONS or "the family has no ablations, and does not say why")
+
+
+def _can_reach(limits: Robust, failures: int) -> bool:
+    """Whether the bound can still be shown after so many failures, or could not be shown by any."""
+    return not failures or lower_bound(limits.runs - failures, limits.runs) >= limits.bound
 
 
 def _outcome(episode: Rollout) -> dict[str, Any]:

@@ -36,7 +36,7 @@ def posed(text: str, conditions: Conditions | None, scenario: str, seed: int = 0
     if conditions is None:
         return text
     if Impairment.of_spec(from_mjcf(text)):
-        raise BadConfig(f"{conditions}: the scene has conditions of control already; use that of its training twin")
+        raise BadConfig(f"{conditions}: the scene has conditions of control already; give a pool without them")
     robot = conditions.embodiment
     drawn, arms = impairment(conditions, scenario, seed), len(hands(robot))
     if not start(conditions, arms, scenario, seed, 0):

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from .. import html_tables
 from ..control.loop import ACTION, Loop
-from ..control.teleop import MOTION
+from ..control.teleop import MOTION, unfiltered
 from ..episode import STRICT, Actions, Episode, Outcome, Rules
 from ..errors import GaveUp
 from ..samplers.keyed import normals, spread
 from ..scenario import Action, Planner, Scenario, Shortcut
+from ..sim.arm import ROBOT
 from ..sim.world import World
 from .settings import Robust
 
@@ -29,9 +30,11 @@ SHORTCUT_TIME_LIMITS = 3.0
 """Duration of a shortcut that is simulated to rest, in time limits: two fallen tiles may rock for 14 s."""
 AT_REST = "everything came to rest without reaching the goal"
 """Reason of an episode that was simulated to rest."""
+OUT_OF_REACH = "no goal can count any more, it lacks"
+"""Beginning of the reason of an episode that ended because a mean was missed. The missed means follow."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Rollout:
     """Result of a rollout."""
 
@@ -47,10 +50,18 @@ class Rollout:
     """Reason why the plan could not be completed; empty if it was, or if the episode ended before."""
     lacks: str = ""
     """Means of the task that were lacking when the goal was reached, joined by semicolons."""
+    converged: bool = False
+    """Whether more iterations of the solver would have given the same bits, see `Loop.converged`."""
+    filtered: bool = True
+    """Whether the teleoperation filter has changed an action of the plan. If not, the raw plan gives the same bits."""
 
     @property
     def solved(self) -> bool:
         return self.outcome == "success"
+
+    def __repr__(self) -> str:
+        why = f": {self.reason}" if self.reason else ""
+        return f"Rollout({self.outcome}{why}, {self.seconds:.2f} s, {len(self.actions)} actions)"
 
     def _repr_html_(self) -> str:
         """Its result, in a notebook."""
@@ -121,7 +132,7 @@ class Jitter:
         shake = np.zeros((len(action) // ACTION, ACTION))
         for arm, channels in enumerate(shake):
             channels[:MOTION] = normals(MOTION, self.key, "action", period, arm)
-        return np.clip(action + self.noise * shake.ravel(), -1.0, 1.0)
+        return (action + self.noise * shake.ravel()).clip(-1.0, 1.0)
 
 
 def run(
@@ -134,6 +145,7 @@ def run(
     until_settled: bool = False,
     raw: bool = False,
     rules: Rules = STRICT,
+    until_decided: bool = False,
 ) -> Rollout:
     """Play a plan from the start of `world` until success, failure or the horizon.
 
@@ -146,10 +158,20 @@ def run(
             pending.
         raw: whether actions go to the controller as they are, clipped; else through the teleoperation filter.
         rules: rules that end the episode.
+        until_decided: whether the episode may end once a mean was missed, if the rules require all means: no goal
+            counts from then on.
     """
     world.reset()
-    stillness = Stillness(scenario, world) if until_settled else None
-    return _play(scenario, world, _Planned(world, planner, jitter, raw), horizon, settle, stillness, rules)
+    episode = Episode(scenario, world, horizon, rules)
+    return _play(episode, _Planned(world, planner, jitter, raw), settle, until_settled, until_decided)
+
+
+def go_on(episode: Episode, planner: Planner, settle: float = 1.0) -> Rollout:
+    """Play a plan from where an open episode is, until it ends, or everything is at rest after the plan.
+
+    The actions of the result are those of the plan alone.
+    """
+    return _play(episode, _Planned(episode.world, planner, None, False), settle, True)
 
 
 def replay(
@@ -163,16 +185,27 @@ def replay(
 ) -> Rollout:
     """Play recorded actions, which have passed the filter already. Needs no oracle. Afterwards the robot is idle."""
     world.reset()
-    stillness = Stillness(scenario, world) if until_settled else None
-    return _play(scenario, world, _Recorded(world, actions), horizon, settle, stillness, rules)
+    return _play(Episode(scenario, world, horizon, rules), _Recorded(world, actions), settle, until_settled)
 
 
 def try_shortcut(
-    scenario: Scenario, world: World, shortcut: Shortcut, horizon: float, settle: float = 1.0, raw: bool = False
+    scenario: Scenario,
+    world: World,
+    shortcut: Shortcut,
+    horizon: float,
+    settle: float = 1.0,
+    raw: bool = False,
+    until_decided: bool = False,
 ) -> Rollout:
-    """Play a tempting plan as a certificate does: until the time limit, or longer if it is simulated to rest."""
+    """Play a tempting plan as a certificate does: until the time limit, or longer if it is simulated to rest.
+
+    Args:
+        until_decided: as for `run`; a plan that is simulated to rest is played to its end all the same.
+    """
     patience = SHORTCUT_TIME_LIMITS if shortcut.to_rest else 1.0
-    return run(scenario, world, shortcut.plan, patience * horizon, settle, until_settled=True, raw=raw)
+    decided = until_decided and not shortcut.to_rest
+    horizon = patience * horizon
+    return run(scenario, world, shortcut.plan, horizon, settle, until_settled=True, raw=raw, until_decided=decided)
 
 
 class _Planned:
@@ -180,7 +213,7 @@ class _Planned:
 
     def __init__(self, world: World, planner: Planner, jitter: Jitter | None, raw: bool):
         self.plan, self.world, self.jitter = planner(world), world, jitter
-        self.raw = raw
+        self.raw, self.filtered = raw, world.channel.changes
         self.ended, self.note, self.periods = False, "", 0
         self.delayed: deque[Action] = deque([world.idle] * (jitter.latency if jitter else 0))
 
@@ -191,7 +224,10 @@ class _Planned:
             self.delayed.append(self.jitter.shaken(action, self.periods))
             action = self.delayed.popleft()
         self.periods += 1
-        return self.world.received(action, self.raw)
+        received = self.world.received(action, self.raw)
+        if not self.filtered and not np.array_equal(received, unfiltered(action)):
+            self.filtered = True
+        return received
 
     def stop(self) -> None:
         """Called when the goal has been reached: the rest of the plan is not played."""
@@ -211,7 +247,7 @@ class _Planned:
 class _Recorded:
     """Recorded actions, then idle ones. The recording covers the settling phase."""
 
-    note = ""
+    note, filtered = "", True
 
     def __init__(self, world: World, actions: Actions):
         self.world, self.ended = world, False
@@ -225,6 +261,16 @@ class _Recorded:
 
     def stop(self) -> None:
         """Called when the goal has been reached; a recording goes on."""
+
+
+def still_moving(world: World) -> list[str]:
+    """Bodies that move faster now than `REST_TOLERANCE` allows a body at rest; `ROBOT` stands for the robot's."""
+    found = dict[str, None]()
+    for dof, speed in enumerate(np.abs(world.data.qvel)):
+        body = int(world.model.dof_bodyid[dof])
+        if speed * REST_TIME >= REST_TOLERANCE:
+            found[ROBOT if body in world.own else world.model.body(body).name] = None
+    return list(found)
 
 
 class Stillness:
@@ -247,16 +293,15 @@ class Stillness:
 
 
 def _play(
-    scenario: Scenario,
-    world: World,
+    episode: Episode,
     source: _Planned | _Recorded,
-    horizon: float,
     settle: float,
-    stillness: Stillness | None,
-    rules: Rules = STRICT,
+    until_settled: bool,
+    until_decided: bool = False,
 ) -> Rollout:
     actions: list[NDArray[np.float32]] = []
-    episode = Episode(scenario, world, horizon, rules)
+    world, decided = episode.world, until_decided and episode.rules == STRICT
+    stillness = Stillness(episode.scenario, world) if until_settled else None
 
     def step() -> Outcome | None:
         actions.append(source.next())
@@ -264,9 +309,12 @@ def _play(
 
     def ended(outcome: Outcome, reason: str, at: float) -> Rollout:
         played = np.array(actions, np.float32).reshape(-1, world.size)
-        return Rollout(outcome, reason, round(at, 6), played, world.digest, source.note, episode.lacks)
+        about = (source.note, episode.lacks, world.loop.converged, source.filtered)
+        return Rollout(outcome, reason, round(at, 6), played, world.digest, *about)
 
     while step() is None:
+        if decided and (missed := episode.means.missed):
+            return ended("failure", f"{OUT_OF_REACH}: {missed}", world.time)
         if stillness and source.ended and not episode.held and stillness.lasts():
             return ended("timeout", source.note or AT_REST, world.time)
     if episode.outcome == "timeout":

@@ -10,6 +10,7 @@ MAX_SETTINGS = {
     "chunk": 1000,
     "comparisons": 1_000_000,
     "epochs": 1_000_000,
+    "patience": 10_000,
     "films": 100_000,
     "explore": 100,
     "first": 1_000_000_000,
@@ -44,7 +45,7 @@ computed."""
 
 
 def check_count(n: int, limit: int | None, most: int | None, why: str, what: str) -> None:
-    """Raise `BadConfig` if a run cannot make n results, whatever it draws.
+    """Raise `BadConfig` if a run cannot make n results with any draws.
 
     Args:
         limit: largest number of tries; None if it is not set.

@@ -23,14 +23,17 @@ class Log:
         identity: Mapping[str, Any],
         remedy: str = "choose another to=",
         head: Path | None = None,
+        replaces: bool = False,
     ):
         """
         Args:
             identity: settings on which the records depend; records with another identity are not touched.
             remedy: remedy in the error about such records.
             head: a separate file for the identity, which then is not the first line.
+            replaces: whether records of an earlier run are removed.
         """
         self.path, self.identity, self.remedy, self.head = path, dict(identity), remedy, head
+        self.replaces = replaces
         self.records: list[dict[str, Any]] = []
         self._lock = FileLock(path.with_suffix(".lock"))
 
@@ -87,6 +90,9 @@ class Log:
 
     def _open(self) -> None:
         """Read the file and prepare it for more records. A line that a kill has cut short is dropped."""
+        for path in (self.path, self.head) if self.replaces else ():
+            if path is not None:
+                path.unlink(missing_ok=True)
         try:
             content = read_plain(self.path, MAX_JOURNAL) if os.path.lexists(self.path) else b""
         except ValueError as error:
@@ -106,7 +112,7 @@ class Log:
             raise BadConfig(f"{self.path.parent} holds results of other pools or settings ({names}); {self.remedy}")
         self.records = whole[1:] if self.head is None else whole
         if self.head is not None and stored != self.identity:
-            self.head.write_text(json.dumps(self.identity, indent=1, sort_keys=True) + "\n")
+            write(self.head, json.dumps(self.identity, indent=1, sort_keys=True) + "\n")
         self._file = open(self.path, "ab", buffering=0)  # noqa: SIM115  (closed by `close`)
         self._file.truncate(size)
         if not whole and self.head is None:
@@ -137,8 +143,8 @@ class Log:
 
 
 def different(a: Any, b: Any, path: str = "") -> list[str]:
-    """Dotted names of the settings in which two configurations differ."""
+    """Dotted names of the settings in which two configurations differ; the code of a task by this name."""
     if isinstance(a, dict) and isinstance(b, dict):
         keys = sorted(a.keys() | b.keys())
         return [d for k in keys for d in different(a.get(k), b.get(k), f"{path}.{k}".strip("."))]
-    return [] if a == b else [path]
+    return [] if a == b else ["the code of the task" if path == "source_sha256" else path]

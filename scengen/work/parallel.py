@@ -14,9 +14,8 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, NoReturn, Protocol, TypeVar, runtime_checkable
 
 from ..control import native
-from ..errors import ScengenError
+from ..errors import ScengenError, with_place
 from . import machine
-from .foreign import with_place
 
 A = TypeVar("A")
 B = TypeVar("B")

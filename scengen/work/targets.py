@@ -2,6 +2,7 @@
 
 import errno
 import filecmp
+import itertools
 import os
 import shutil
 import stat
@@ -249,3 +250,25 @@ def _trial_folder(folder: Path) -> Iterator[Path]:
         (trial / "block").write_bytes(b"\0" * 4096)  # a full disk still takes an empty file
         (trial / "block").unlink()
         yield trial
+
+
+def move_aside(*paths: Path) -> list[Path]:
+    """Rename what an earlier run has left, all with the same new number: `pool-1` and `pool-1.run`. Nothing is deleted.
+
+    Returns:
+        The new names of the paths that existed.
+    """
+
+    def numbered(path: Path, number: int) -> Path:
+        return path.with_name(f"{path.stem}-{number}{path.suffix}")
+
+    free = next(k for k in itertools.count(1) if not any(os.path.lexists(numbered(path, k)) for path in paths))
+    moved = []
+    for path in paths:
+        if os.path.lexists(path):
+            try:
+                path.rename(numbered(path, free))
+            except OSError as error:
+                raise refused(path, error) from None
+            moved.append(numbered(path, free))
+    return moved

@@ -14,8 +14,9 @@ POSE = re.compile(r"^(.+): position \[([^\]]*)\], quaternion xyzw \[([^\]]*)\], 
 
 
 def poses(text):
-    """Positions, quaternions and sizes of the things in a prompt, by their names."""
-    return {m[1]: tuple([float(v) for v in group.split(",")] for group in m.groups()[1:]) for m in POSE.finditer(text)}
+    """Middles of the lower sides of the things in a prompt, which stand upright, quaternions and sizes, by name."""
+    told = {m[1]: tuple([float(v) for v in group.split(",")] for group in m.groups()[1:]) for m in POSE.finditer(text)}
+    return {name: ([x, y, z - size[2] / 2], quat, size) for name, ((x, y, z), quat, size) in told.items()}
 
 
 class Listed:

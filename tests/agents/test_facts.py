@@ -1,6 +1,7 @@
 """Facts are answerable in every split, honest about what is hidden, and their names give nothing away."""
 
 import re
+from types import SimpleNamespace
 
 import pytest
 from sheets import STATED, drawn
@@ -61,7 +62,8 @@ def test_the_order_has_no_circle_and_needs_nothing_that_may_be_left_out(name):
 def test_prompts_name_no_scenario_split_axis_parameter_or_body(name, split):
     task = load_task(name)
     sheet, scenario, found = drawn(name, split, 0)
-    scene = scene_text(task.instruction, task.embodiment, sheet.objects, View({}, ()))
+    row = SimpleNamespace(embodiment=task.embodiment, horizon=task.horizon)
+    scene = scene_text(task.instruction, row, sheet, View({}, ()))
     text = prompt("understand", scene=scene, facts=found, faults=[])
     text += prompt("plan", vocabulary=sheet.plan.vocabulary, conditions=sheet.plan.conditions)
     telling = {scenario.id, name, task.code, *(axis for axis in task.axes if "_" in axis)}

@@ -8,7 +8,7 @@ from sheets import STATED
 
 from scengen import load_task
 from scengen.agents import facts
-from scengen.agents.grading import PlanError, grade_plan, grade_understanding
+from scengen.agents.grading import PlanError, decided, grade_plan, grade_understanding
 from scengen.agents.replies import OTHER, Audit, Claim, Planned, Step, Understanding, Unknown, Why
 
 MAX_REFUSED = 0.03
@@ -59,6 +59,20 @@ def test_the_plan_of_the_file_is_right_and_a_plan_without_any_step_of_it_is_not(
     assert grade(task, " ".join(order.subgoals)).right and grade(task, " ".join(order.required)).right
     for left_out in order.required:
         assert not grade(task, " ".join(name for name in order.required if name != left_out)).right
+
+
+def test_a_plan_that_reaches_the_goal_is_not_wrong_for_its_order():
+    misplaced, left_out = [["wrong order", "a before b"]], [["wrong order", "a before b"], ["missing", "c"]]
+    reached, missed = {"success": True}, {"success": False}
+    for errors, executed, right, remarks in (
+        (misplaced, reached, True, misplaced),
+        (misplaced, missed, False, None),
+        (misplaced, None, False, None),
+        (left_out, reached, False, None),
+    ):
+        found = decided({"right": False, "errors": errors}, executed)
+        assert (found["right"], found.get("remarks"), found["executed"]) == (right, remarks, executed)
+        assert found["errors"] == ([] if right else errors)
 
 
 def test_an_object_that_is_not_there_is_a_hallucination():

@@ -23,7 +23,7 @@ def exams(name, split, model):
     for index in range(SCENARIOS):
         sheet, scenario, found = drawn(name, split, index)
         labels = {"task": name, "split": split, "index": index, "id": scenario.id}
-        row = SimpleNamespace(**labels, instruction=task.instruction, embodiment=task.embodiment)
+        row = SimpleNamespace(**labels, instruction=task.instruction, embodiment=task.embodiment, horizon=9.0)
         stand_in = STAND_INS[model](Key(found, sheet.plan, fixed))
         yield Exam(row, row.instruction, sheet, found, View({}, ("0.0 s: at rest",)), 0.0, stand_in)
 

@@ -6,8 +6,7 @@ import pytest
 
 from scengen import cli
 from scengen.cli.commands import tasks
-from scengen.errors import UnknownName
-from scengen.work.foreign import place_of
+from scengen.errors import UnknownName, place_of
 from scengen.work.parallel import portable
 
 TASK = """
@@ -75,7 +74,17 @@ def test_a_family_that_cannot_be_imported_names_its_file_and_line(written, capsy
 def test_the_fault_of_a_policy_has_its_line(tmp_path, monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "faulty_policy.py").write_text("def mine(*_, **__):\n    return {}['x']\n")
-    assert cli.run(["evaluate", "policy=faulty_policy:mine", "pool=generated/reference", f"to={tmp_path / 'to'}"]) == 2
+    assert (
+        cli.run(
+            [
+                "evaluate",
+                "policy=faulty_policy:mine",
+                "pool=generated/reference/domino_single-id",
+                f"to={tmp_path / 'to'}",
+            ]
+        )
+        == 2
+    )
     assert "faulty_policy.py, line 2, in mine); the fault is the policy's" in capsys.readouterr().err
 
 

@@ -8,7 +8,7 @@ from scengen.validate.certify import lower_bound
 from scengen.validate.settings import CertifySettings, Robust
 
 DOMINO = "task=domino_single"
-REFERENCE = "pool=generated/reference"
+REFERENCE = "pool=generated/reference/domino_single-id"
 
 
 @pytest.mark.parametrize(

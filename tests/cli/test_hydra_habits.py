@@ -130,7 +130,7 @@ def test_info_tells_where_it_comes_from(capsys):
 @pytest.mark.parametrize(
     ("asked", "says"),
     [
-        (("--cfg", "all"), "expected --cfg job"),
+        (("--cfg", "jobs"), "expected --cfg job"),
         (("--cfg",), "expected --cfg job"),
         (("--info", "default"), "did you mean 'defaults'?"),
         (("--cfg", "job", "--info", "defaults"), "give one of them"),
@@ -217,8 +217,8 @@ def test_bash_gets_what_comes_after_its_own_word_breaks(tmp_path):
         (("curate", "stats", "data=x", "executor=null"), "no setting of curate stats named 'executor'"),
         (("generate", "task=domino_single", "executor=null"), "leave it out, or name a file of conf/executor"),
         (("generate", "task=domino_single", f"seed={'9' * 5000}"), "a number of more than 4300 digits"),
-        (("agent", "model=a=b"), "quote the value twice: 'model=\"a=b\"'"),
-        (("show", "pool=x{y"), "quote the value twice: 'pool=\"x{y\"'"),
+        (("agent", "key=a=b"), "quote the value twice: 'key=\"a=b\"'"),
+        (("show", "look=x{y"), "quote the value twice: 'look=\"x{y\"'"),
         (("generate", "task=domino_single", "task.horizon.x=3"), "task.horizon has no settings in it"),
     ],
 )

@@ -65,7 +65,7 @@ def test_a_base_that_is_none_is_one_line(search, tmp_path, capsys, defaults, tol
     [
         ("task/domino_single.yaml", "scengen's task domino_single has its own files; name it after a task of your own"),
         ("language/domino_single.yaml", "which `defaults: [domino_single, _self_]` continues"),
-        ("language/domino_mien.yaml", "there is no task/domino_mien.yaml beside it; name it after a task there"),
+        ("language/domino_mien.yaml", "its folder has no task/domino_mien.yaml; name it after a task there"),
         ("things/packing.yaml", "scengen's task packing has its own files"),
         ("certify/quick.yaml", "scengen has a file of that name; give it another name"),
         ("perturbations/dust.yaml", "offer the folder by an installed package"),

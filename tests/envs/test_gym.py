@@ -56,7 +56,7 @@ def test_a_certified_pool_of_every_task_comes_with_scengen():
     assert sorted(pool.task for pool in pools) == sorted(list_tasks())
     assert all(pool.split == "id" and 3 <= len(pool) <= 6 for pool in pools)
     assert sum(file.stat().st_size for file in REFERENCES.rglob("*") if file.is_file()) < 8e6
-    assert {folder for folder in members(REFERENCES)} == {str(reference_pool(name)) for name in list_tasks()}
+    assert set(members(REFERENCES)) == {str(reference_pool(name)) for name in list_tasks()}
 
 
 def test_learners_see_the_scene_unless_they_ask_for_less():
@@ -72,7 +72,7 @@ def test_learners_see_the_scene_unless_they_ask_for_less():
 
 
 def test_readings_are_found_by_their_names(env):
-    seen, info = env.reset(seed=1)
+    seen, _ = env.reset(seed=1)
     plain, row = env.unwrapped, Pool.open(REFERENCE).at(1)
     tile, height = plain.entry("tile_0_pos"), plain.entry("tile_0_pos.z")
     assert tile.of(seen) == pytest.approx(plain.world.pos("tile_0"), abs=1e-4) and height.of(seen) == tile.of(seen)[2:]
@@ -91,7 +91,9 @@ def test_the_legend_names_every_number_of_every_vector():
     vectors = {name: each for name, each in env.metadata["names"].items() if "tactile" not in name}
     assert names == {entry.rpartition(".")[0] for entries in vectors.values() for entry in entries}
     assert "object-state[26:29]      tile_0_pos                   x y z [m]" in lines
-    assert sum(entry.where.stop - entry.where.start for entry in map(env.entry, names)) == sum(map(len, vectors.values()))
+    assert sum(entry.where.stop - entry.where.start for entry in map(env.entry, names)) == sum(
+        map(len, vectors.values())
+    )
     assert {line.split(" ")[0] for line in lines if "[" not in line} == {"robot0_tactile_left", "rgb_ego_cam"}
     assert max(map(len, lines)) <= 85
 
@@ -101,7 +103,9 @@ def test_the_specification_has_the_time_limit_in_steps(repeat, steps):
     made = gymnasium.make("scengen/domino_single-v2", action_repeat=repeat)
     assert made.spec.max_episode_steps == steps == made.unwrapped.max_episode_steps
     assert "TimeLimit" not in str(made), "the environment truncates by itself, at the limit of the pool"
-    assert gymnasium.make_vec("scengen/domino_single-v2", num_envs=1, action_repeat=repeat).spec.max_episode_steps == steps
+    assert (
+        gymnasium.make_vec("scengen/domino_single-v2", num_envs=1, action_repeat=repeat).spec.max_episode_steps == steps
+    )
 
 
 def test_every_task_is_registered():

@@ -246,7 +246,7 @@ def test_a_policy_that_tells_its_version_is_bound_to_it_and_not_to_its_source(mi
 @pytest.mark.parametrize(
     ("source", "says"),
     [
-        ("raise RuntimeError('no GPU')\n", "its module cannot be imported (RuntimeError: no GPU)"),
+        ("raise RuntimeError('no GPU')\n", "its module cannot be imported (RuntimeError: no GPU, "),
         ("import nowhere_at_all\nUp = 1\n", "its module cannot be imported (ModuleNotFoundError"),
         ("def Up(env): return None\n", "its factory returned NoneType, which has no method reset and no act"),
         ("def Up(env): return 1 / 0\n", "its factory fails (ZeroDivisionError"),

@@ -1,6 +1,7 @@
 """Episodes that another program plays have the lines of `scengen evaluate`, and verify."""
 
 import json
+import os
 import shutil
 
 import numpy as np
@@ -122,3 +123,54 @@ def test_forged_lines_of_a_harness_are_found(results, tmp_path, forge):
     text = "".join(json.dumps(line) + "\n" for line in renewed(identity, lines))
     (folder / "episodes.jsonl").write_text(text)
     assert cli.run(["verify", f"results={folder}", "level=full"]) == 1
+
+
+@pytest.mark.parametrize(
+    "who",
+    [
+        Player("", "mine"),
+        Player("h", ""),
+        Player("h", "p" * 201),
+        Player("h\n", "p"),
+        Player("h", "\udc80"),
+        Player(5, "p"),
+    ],
+)
+def test_names_that_no_line_could_hold_are_refused(tmp_path, who):
+    with pytest.raises(BadConfig, match="give one line of 1 to 200 characters"):
+        Recorder(tmp_path / "out", who, env())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_goes_on_is_not_replaced(tmp_path):
+    own = env()
+    recorder = Recorder(tmp_path / "out", WHO, own)
+    played(recorder, own, 0)
+    with pytest.raises(BadConfig, match="another run is writing"):
+        Recorder(tmp_path / "out", WHO, env(), replaces=True)
+    recorder.close()
+    assert len(read_lines(tmp_path / "out" / "episodes.jsonl")) == 1
+    with pytest.raises(BadConfig, match="is closed; make another one"):
+        played(recorder, own, 0)
+    Recorder(tmp_path / "out", WHO, env(), replaces=True).close()
+    assert not (tmp_path / "out" / "episodes.jsonl").read_bytes()
+
+
+@pytest.mark.parametrize("strange", ["link", "pipe"])
+def test_the_settings_of_a_run_are_written_to_its_folder_alone(tmp_path, strange):
+    (tmp_path / "out").mkdir()
+    path = tmp_path / "out" / "run.json"
+    path.symlink_to(tmp_path / "elsewhere") if strange == "link" else os.mkfifo(path)
+    Recorder(tmp_path / "out", WHO, env()).close()
+    assert path.is_file() and not path.is_symlink() and not (tmp_path / "elsewhere").exists()
+
+
+def test_a_reason_without_end_is_cut_and_info_without_one_is_refused(tmp_path, capsys):
+    own = env()
+    recorder = Recorder(tmp_path / "out", WHO, own)
+    recorder.begin(own, own.reset(options={"scenario": own.scenarios[0]})[0])
+    with pytest.raises(BadConfig, match="info has no reason; give the last one"):
+        recorder.end(own, {"success": False})
+    recorder.end(own, {"success": False, "reason": "late " * 100_000})
+    recorder.close()
+    assert len(read_lines(tmp_path / "out" / "episodes.jsonl")[0]["reason"]) < 1010

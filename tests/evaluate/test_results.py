@@ -270,7 +270,8 @@ def test_kept_actions_say_what_the_policy_perceived(results, tmp_path, capsys):
         ({"policy": "ours"}, "says policy = 'ours'"),
     ):
         (changed / DEMONSTRATIONS).write_text(json.dumps({**told, **entries}))
-        assert any(says in fault for fault in verdict(folder).faults)
+        for options in (EVERY, ONE):
+            assert any(says in fault for fault in verdict(folder, options).faults)
     (changed / DEMONSTRATIONS).write_text(json.dumps({k: v for k, v in told.items() if k != "perturb_seed"}))
     with pytest.raises(PoolError, match="a condition"):
         verdict(folder)

@@ -26,20 +26,20 @@ EDITS = (
         (
             (
                 WORLD,
-                "        others = self.loop.touching[self.row(body)]\n"
-                "        scene = {self.model.body(int(i)).name for i in np.flatnonzero(others[: self.model.nbody])"
-                " if i not in self.own}\n",
-                "        others = self.loop.touching[self.row(body)]\n        scene = self._scene_names(others)\n",
+                "        names = self._others\n"
+                "        found = {names[i] for i in self.loop.touching[self.row(body)].nonzero()[0].tolist()"
+                " if i in names}\n",
+                "        found = self._names_in(self.loop.touching[self.row(body)])\n",
             ),
             (
                 WORLD,
                 "    @property\n    def free_bodies(self)",
-                "    def _scene_names(self, row: NDArray[np.uint8]) -> set[str]:\n"
-                '        """Names of the scene\'s bodies that a row of a contact table marks."""\n'
+                "    def _names_in(self, row: NDArray[np.uint8]) -> set[str]:\n"
+                '        """Names of the bodies that a row of a contact table marks."""\n'
                 "        found = set()\n"
-                "        for i in np.flatnonzero(row[: self.model.nbody]):\n"
-                "            if int(i) not in self.own:\n"
-                "                found.add(self.model.body(int(i)).name)\n"
+                "        for i in np.flatnonzero(row):\n"
+                "            if int(i) in self._others:\n"
+                "                found.add(self._others[int(i)])\n"
                 "        return found\n\n"
                 "    @property\n    def free_bodies(self)",
             ),
@@ -50,28 +50,21 @@ EDITS = (
         (YCB, "slip_recovery"),
         (
             (WORLD, "    _happening: bool = field", "    _in_events: bool = field"),
-            (WORLD, "        self._happening = True\n", "        self._in_events = True\n"),
-            (WORLD, "            self._happening = False\n", "            self._in_events = False\n"),
+            (WORLD, "        world._happening = True\n", "        world._in_events = True\n"),
+            (WORLD, "        self._world._happening = False\n", "        self._world._in_events = False\n"),
             (WORLD, "        if not self._happening:\n", "        if not self._in_events:\n"),
         ),
     ),
     Edit(
-        "cache_index_of_memory",
+        "search_index_of_memory",
         (YCB, "slip_recovery"),
         (
             (
                 "scengen/sim/memory.py",
-                "        self._data, self._check = data, check\n",
-                "        self._data, self._check = data, check\n"
-                "        self._places = {name: place for place, name in enumerate(self.names)}\n",
+                "            return self._index[name]",
+                "            return self.names.index(name)",
             ),
-            (
-                "scengen/sim/memory.py",
-                '        if name not in self.names:\n            raise UnknownName("memory", name, self.names)\n'
-                "        return self.names.index(name)",
-                '        if name not in self._places:\n            raise UnknownName("memory", name, self.names)\n'
-                "        return self._places[name]",
-            ),
+            ("scengen/sim/memory.py", "        except KeyError:", "        except ValueError:"),
         ),
     ),
     Edit(

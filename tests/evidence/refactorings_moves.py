@@ -181,8 +181,8 @@ EDITS = (
         (
             (
                 MOTION,
-                "    action[:3] = velocity / RATE + STIFFNESS * (setpoint - arm.hand)",
-                "    action[:3] = velocity * (1.0 / RATE) + (STIFFNESS * setpoint - STIFFNESS * arm.hand)",
+                "        action[i] = velocity[i] / RATE + STIFFNESS * (setpoint[i] - hand[i])",
+                "        action[i] = velocity[i] * (1.0 / RATE) + (STIFFNESS * setpoint[i] - STIFFNESS * hand[i])",
             ),
         ),
         rounds=True,

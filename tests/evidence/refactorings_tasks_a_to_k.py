@@ -92,14 +92,13 @@ EDITS = (
         ),
     ),
     Edit(
-        "toss_caches_unit_vector",
+        "toss_computes_unit_vector_each_time",
         ("cube_toss",),
         (
-            (TOSS, "import math\nfrom collections.abc", "import functools\nimport math\nfrom collections.abc"),
             (
                 TOSS,
+                "    @cached_property\n    def u(self) -> Vec3:",
                 "    @property\n    def u(self) -> Vec3:",
-                "    @functools.cached_property\n    def u(self) -> Vec3:",
             ),
             (
                 TOSS,

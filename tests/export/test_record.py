@@ -427,7 +427,7 @@ def test_without_cameras_neither_opengl_nor_pyav_is_needed(tmp_path, monkeypatch
         (["width=641"], "width = 641; the width and height of a video must be even numbers"),
         (["n=0"], "n = 0; it must be at least 1"),
         ([f"to={REFERENCE}"], "is a pool already (manifest.json); choose another to="),
-        ([f"to={Path(__file__).parent}"], "exists already and is no recording; delete it, or give another name"),
+        ([f"to={Path(__file__).parent}"], "exists already and is not a recording; delete it, or give another name"),
         (["to=/dev/null/out"], "cannot be written"),
         (["pool=nowhere"], "no pool at nowhere"),
     ],

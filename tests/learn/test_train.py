@@ -1,5 +1,6 @@
 """Training: the same data give the same weights, also after an interruption, and what was shown is learned."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from scengen.errors import BadConfig
 from scengen.learn.data import TrainingData, Trajectory
+from scengen.learn.expected import expected
 from scengen.learn.models import BC, KINDS, KNN, MIP, REFINED_AT, perceptron, predict
 from scengen.learn.store import StoredPolicy
 from scengen.learn.train import TrainSettings, train
@@ -191,3 +193,70 @@ def test_settings_without_a_meaning_are_refused(tmp_path, changes, said):
     with pytest.raises(Exception) as error:
         trained(tmp_path, **changes)
     assert said in str(error.value) and not list(tmp_path.iterdir())
+
+
+def by_heart(count=10, rows=8, entries=40):
+    """Demonstrations of noise: they can be learned by heart alone."""
+    random, data, found = np.random.default_rng(5), shown(count, rows), []
+    for one in data.trajectories:
+        seen = random.uniform(-1, 1, (rows, entries)).astype(np.float32)
+        actions = np.hstack([random.uniform(-1, 1, (rows, 6)), one.actions[:, 6:]]).astype(np.float32)
+        found.append(replace(one, actions=actions, observations=seen))
+    return replace(data, trajectories=tuple(found), entries=tuple(f"noise.{k}" for k in range(entries)))
+
+
+HARD = {"hidden": [128], "members": 1, "epochs": 80}
+"""A network that is large enough to learn the noise of `by_heart`."""
+
+
+def test_a_policy_that_learns_by_heart_is_said_to_and_one_that_learns_is_not(tmp_path):
+    noise = trained(tmp_path / "noise", data=by_heart(), **HARD)
+    assert "the held-out error rose from" in noise.memorised and "memorised them" in noise.memorised
+    assert trained(tmp_path / "shown").memorised == ""
+
+
+def test_with_patience_the_weights_of_the_best_epoch_are_kept(tmp_path):
+    whole = trained(tmp_path / "whole", data=by_heart(), **HARD)
+    best = 1 + int(np.argmin([held_out for _, held_out in whole.losses]))
+    early = trained(tmp_path / "early", data=by_heart(), patience=5, **HARD)
+    assert best + 5 < 80 and len(early.losses) == best + 5 and early.losses == whole.losses[: best + 5]
+    assert early.settings.epochs == best
+
+    class Cut(Exception):
+        pass
+
+    def cut(done, *_):
+        if done == best:
+            raise Cut
+
+    with pytest.raises(Cut):
+        trained(tmp_path / "cut", cut, data=by_heart(), **HARD)
+    with (
+        np.load(next((tmp_path / "cut").glob("unfinished-*"))) as stored,
+        np.load(tmp_path / "early" / "weights.npz") as kept,
+    ):
+        assert all(
+            np.array_equal(stored[name], kept[name]) for name in stored if name.startswith(("weights", "biases"))
+        )
+
+
+def test_an_interrupted_training_with_patience_ends_with_the_same_weights(tmp_path):
+    def interrupt(done, total, told):
+        if done == 20:
+            raise KeyboardInterrupt
+
+    settings = {"data": by_heart(), "patience": 15, **HARD}
+    trained(tmp_path / "whole", **settings)
+    with pytest.raises(KeyboardInterrupt):
+        trained(tmp_path / "cut", interrupt, **settings)
+    assert trained(tmp_path / "cut", **settings).earlier == 20
+    assert weights(tmp_path / "cut") == weights(tmp_path / "whole")
+    assert trained(tmp_path / "cut", **settings).losses == (), "it is there already"
+
+
+def test_a_training_says_what_to_expect():
+    assert re.fullmatch(
+        r"to expect: of 20 training scenarios bc solved [\d.]+ after 25, [\d.]+ after 50, .* demonstrations.*",
+        expected("domino_single", BC),
+    )
+    assert "was not measured" in expected("packing", BC)

@@ -46,7 +46,7 @@ def put_there(scenario, places, probed=True):
     for cube, rank in zip(scenario.cubes, places, strict=True):
         if rank is not None:
             at = world.model.jnt_qposadr[world.model.body(cube).jntadr[0]]
-            world.data.qpos[at : at + 3] = scenario.zone_at(rank)
+            world.data.qpos[at : at + 3] = scenario.zones[rank]
     for _ in range(50):
         world.step(IDLE)
     return world
@@ -90,7 +90,7 @@ def test_lifted_is_a_centimetre_up_in_the_hand():
 
 def test_mirrored_zones_ask_for_the_order_from_right_to_left():
     mirrored = replace(SCENE, mirrored=1)
-    assert all(np.allclose(mirrored.zone_at(k), SCENE.zone_at(2 - k)) for k in range(3))
+    assert all(np.allclose(mirrored.zones[k], SCENE.zones[2 - k]) for k in range(3))
     assert mirrored.success(put_there(mirrored, mirrored.ranks))
 
 
@@ -185,7 +185,7 @@ class Sorted(MassSort):
 
     @property
     def spots(self):
-        return tuple(Spot(x=float(x), y=float(y)) for x, y, _ in (self.zone_at(rank) for rank in self.ranks))
+        return tuple(Spot(x=float(x), y=float(y)) for x, y, _ in (self.zones[rank] for rank in self.ranks))
 
 
 def test_what_is_refuted_is_refuted_for_reasons_of_its_own():

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
 import pytest
@@ -9,15 +10,18 @@ from helpers import shift
 
 from scengen import load_task
 from scengen.certificate import CHECKS
+from scengen.control.loop import Loop
+from scengen.episode import PAPER
 from scengen.geometry import UP, compound, quat
+from scengen.scenario import Shortcut
 from scengen.sim.arm import ROBOT
 from scengen.sim.world import World
 from scengen.tasks.domino_single import SLAB_DISPLACEMENT, DominoSingle
 from scengen.tasks.pendulum_grasp import BOB, HINGE
-from scengen.validate.certify import certify, lower_bound
+from scengen.validate.certify import certify
 from scengen.validate.rebuilt import world_of
-from scengen.validate.rollout import AT_REST, Jitter, replay, run
-from scengen.validate.settings import CertifySettings, Robust
+from scengen.validate.rollout import AT_REST, OUT_OF_REACH, Jitter, replay, run, try_shortcut
+from scengen.validate.settings import CertifySettings, Robust, lower_bound
 
 HORIZON = 12.0
 
@@ -185,6 +189,69 @@ def test_a_means_that_is_not_needed_refutes_the_scene():
     assert certificate.reason == "ablations: the witness succeeds with 'no_change'"
 
 
+# --- rollouts that end when they are decided ---------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def to_the_end():
+    return certify(load_task("domino_single").draw("id", 0, 1).scenario, HORIZON, CertifySettings(), to_the_end=True)
+
+
+def test_only_raw_shortcuts_end_before_the_plan_does(good, to_the_end):
+    assert (good.digest, good.scene_xml) == (to_the_end.digest, to_the_end.scene_xml)
+    for one, other in zip(good.certificate.checks, to_the_end.certificate.checks, strict=True):
+        assert one == other or one.name == "shortcuts"
+    short, whole = (made.certificate["shortcuts"].numbers for made in (good, to_the_end))
+    cut = {name for name in short if short[name]["raw"] != whole[name]["raw"]}
+    assert cut and all(short[name]["filtered"] == whole[name]["filtered"] for name in short)
+    for name in cut:
+        assert short[name]["raw"]["reason"].startswith(OUT_OF_REACH)
+        assert short[name]["raw"]["seconds"] < whole[name]["raw"]["seconds"]
+        assert whole[name]["raw"]["outcome"] != "success"
+
+
+def test_a_plan_that_is_simulated_to_rest_does_not_end_when_a_mean_is_missed():
+    scenario = DominoSingle()
+    plan, world = scenario.shortcuts()["push_the_last_tile"].plan, world_of(scenario)
+    ends = [try_shortcut(scenario, world, Shortcut(plan, rest), HORIZON, until_decided=True) for rest in (False, True)]
+    assert ends[0].reason.startswith(OUT_OF_REACH) and not ends[1].reason.startswith(OUT_OF_REACH)
+
+
+def test_a_plan_that_the_filter_leaves_alone_gives_the_same_bits_raw():
+    scenario = DominoSingle()
+    world = world_of(scenario)
+
+    def stand(world):
+        yield from repeat(world.idle, 20)
+
+    still = [try_shortcut(scenario, world, Shortcut(stand), HORIZON, raw=raw) for raw in (False, True)]
+    assert not still[0].filtered and still[0].digest == still[1].digest
+    assert try_shortcut(scenario, world, scenario.shortcuts()["push_the_slab"], HORIZON).filtered
+
+
+def test_idling_goes_on_where_the_rest_check_ended():
+    scenario = load_task("galileo_ramp_drop").draw("id", 0, 0).scenario
+    periods = round(CertifySettings().rest.seconds / Loop.PERIOD)
+
+    def wait(world):
+        yield from repeat(world.idle, periods)
+
+    whole = run(scenario, world_of(scenario), wait, HORIZON, until_settled=True, rules=PAPER)
+    numbers = certify(scenario, HORIZON, CertifySettings(), last="idle").certificate["idle"].numbers
+    assert numbers == {"outcome": whole.outcome, "reason": whole.reason, "seconds": whole.seconds}
+
+
+@pytest.mark.parametrize(("iterations", "converged"), [(100, True), (2, False)])
+def test_twice_the_iterations_give_the_same_bits_if_the_solver_has_converged(good, iterations, converged):
+    scenario = load_task("domino_single").draw("id", 0, 1).scenario
+    ends = []
+    for factor in (1, 2):
+        world = World.load(good.scene_xml)
+        world.model.opt.iterations = factor * iterations
+        ends.append(replay(scenario, world, good.witness[:150], HORIZON))
+    assert ends[0].converged is converged and (ends[0].digest == ends[1].digest) is converged
+
+
 # --- robustness -------------------------------------------------------------------------------
 
 
@@ -200,7 +267,10 @@ def test_too_few_runs_cannot_show_a_high_bound():
 
 def test_a_scene_that_only_works_undisturbed_is_not_certified():
     wild = CertifySettings(robust=Robust(runs=4, bound=0.45, position=0.06, turn=60.0))
-    assert certify(DominoSingle(), HORIZON, wild).certificate.failed.name == "robust"
+    certificate = certify(DominoSingle(), HORIZON, wild).certificate
+    assert certificate.failed.name == "robust"
+    numbers = certificate["robust"].numbers
+    assert len(numbers["failures"]) == 1 and numbers["failures"][0].startswith(f"run {numbers['runs'] - 1}: ")
 
 
 def test_jitter_moves_what_it_should_by_what_its_key_says():

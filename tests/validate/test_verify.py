@@ -4,6 +4,7 @@ Rows are forged from the reference pool and from pools of two other tasks, and e
 without simulation; where the physics was touched that is what matters.
 """
 
+import copy
 import json
 import os
 import re
@@ -13,17 +14,19 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from helpers import REFERENCE, of_stored_pools
 from pools import certificate_of
 
 from scengen import cli, compose, load_task
-from scengen.certificate import as_json
+from scengen.certificate import as_json, from_json
 from scengen.errors import PoolError
 from scengen.pool import Pool
 from scengen.pool.files import sha256
 from scengen.pool.writing import write_pool
+from scengen.validate.certify import Trial
 from scengen.validate.verify.claims import Claims
 from scengen.validate.verify.junit import junit
 from scengen.validate.verify.pools import Examiner, Options, _Run, verify
@@ -320,6 +323,28 @@ def test_every_check_without_an_oracle_comes_out_with_the_same_numbers():
     assert reasons("single", rows("single")[0], "recheck", simulated=True) == ()
 
 
+@cache
+def shortcuts_made_again(to_the_end):
+    """Numbers of the check of shortcuts of a row, made as now or as in earlier releases."""
+    row, of_pool = rows("single")[0], claims("single")
+    scenario = of_pool.task.scenario(row.params)
+    trial = Trial(scenario, row.horizon, of_pool.settings, row.embodiment, to_the_end=to_the_end)
+    trial.check("compiles")
+    return from_json(as_json(trial.check("shortcuts").numbers))
+
+
+@pytest.mark.parametrize("to_the_end", [False, True])
+@pytest.mark.parametrize("forged", [False, True])
+def test_shortcuts_that_were_played_to_their_end_are_accepted_and_forged_ones_are_not(to_the_end, forged):
+    told = copy.deepcopy(shortcuts_made_again(to_the_end))
+    assert told != shortcuts_made_again(not to_the_end)
+    if forged:
+        next(iter(told.values()))["raw"]["seconds"] += 0.01
+    row = check("shortcuts", numbers=told)(rows("single")[0])
+    found = reasons("single", row, "full", simulated=True)
+    assert bool(found) is forged and all("check shortcuts has other numbers" in reason for reason in found)
+
+
 # --- pools ----------------------------------------------------------------------------------------------
 
 
@@ -604,6 +629,8 @@ def test_junit_tells_every_scenario_and_survives_any_text(mine):
     suite = ET.fromstring(junit({"a\x07b": found}).encode()).find("testsuite")
     assert suite.attrib["tests"] == "7" and suite.attrib["failures"] == "1"
     assert len(suite.findall("testcase")) == 7
+    told = {each.attrib["name"]: each.attrib["value"] for each in suite.findall("properties/property")}
+    assert told["level"] == found.level and told["settings"] == found.settings and told["mujoco"] == mujoco.__version__
 
 
 def test_canonical_numbers_survive_the_way_through_a_pool():

@@ -1,7 +1,6 @@
 """One module per command: its docstring is the help line, `command(arguments)` runs it and returns the exit status."""
 
 import json
-import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -15,7 +14,7 @@ from ...pool import Pool, PoolRow, collection
 from ...pool.library import Library
 from ...pool.library import names as names  # for the commands
 from ...pool.names import Misnamed
-from ...work.printed import PlainConsole, printable
+from ...work.printed import PlainConsole, printable, width
 from ...work.targets import write as write  # for the commands
 
 OK = 0
@@ -27,7 +26,7 @@ BAD_INPUT = 2
 INTERRUPTED = 130
 """Exit status after Ctrl-C."""
 
-out = PlainConsole(width=None if sys.stdout.isatty() else 160)
+out = PlainConsole(width=width())
 err = PlainConsole(stderr=True, soft_wrap=True)
 
 Arguments = Sequence[str]
@@ -118,3 +117,15 @@ def misnaming_remarked() -> Iterator[None]:
 def write_json(path: str, result: Any) -> None:
     """Write the result of a command to the file that json= names."""
     write(Path(path), json.dumps(result, indent=1) + "\n")
+
+
+def say_begun(count: int, what: str, folder: Path, fresh: bool) -> None:
+    """Say before the work that a run continues or starts over, if an earlier one has finished something.
+
+    Args:
+        count: number of things that the earlier run has finished.
+        what: the things, such as "scenarios".
+    """
+    if count:
+        fate = "moved aside, and made again" if fresh else "kept; fresh=true starts over"
+        say(f"{folder}: {count} {what} of an earlier run are {fate}")

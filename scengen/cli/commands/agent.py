@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.table import Table
 
 from ...agents.acting import RETRIES
+from ...agents.comparison import compared, files
 from ...agents.page import TITLES, write_page
 from ...agents.prices import prices
 from ...agents.questioning import ACT, PLAN, UNDERSTAND
@@ -42,11 +43,33 @@ def _run(settings: AgentSettings, search: Sequence[str] = (), ask: bool = True) 
 
 def _report(arguments: Arguments) -> int:
     """Grade an earlier run again from its journal."""
-    if len(arguments) != 1 or not arguments[0].startswith("to="):
-        raise BadConfig("scengen agent report needs to=FOLDER, the folder of a run, and nothing else")
-    folder = Path(arguments[0].removeprefix("to="))
+    given = {each.partition("=")[0]: each.partition("=")[2] for each in arguments}
+    if len(given) != len(arguments) or not given.get("to") or set(given) - {"to", "runs", "prices"}:
+        one, several = "to=FOLDER, the folder of a run", "runs=FOLDER,FOLDER to=FOLDER (and prices=FILE) for several"
+        raise BadConfig(f"scengen agent report needs {one}; or {several}")
+    folder = Path(given["to"])
+    if "runs" in given:
+        return _compared(folder, given["runs"].strip("[]").split(","), given.get("prices"))
+    if "prices" in given:
+        raise BadConfig("prices= belongs to runs=; a run has its own: scengen agent prices=...")
     settings = replace(earlier(folder), to=str(folder), dry=False)
     return _shown(settings, _run(settings, ask=False))
+
+
+def _compared(folder: Path, runs: Sequence[str], given: str | None) -> int:
+    """Print and write the tables of several runs."""
+    found = compared([Path(run) for run in runs], given)
+    for grid in found:
+        shown = Table(title=grid.title, title_justify="left")
+        for name in grid.head:
+            shown.add_column(name, overflow="fold")
+        for row in grid.texts:
+            shown.add_row(*row)
+        out.print(shown)
+    for name, content in files(found).items():
+        write(folder / name, content)
+    say(f"wrote table.md, table.tex and report.html into {folder}")
+    return OK
 
 
 def _shown(settings: AgentSettings, found: Outcome) -> int:

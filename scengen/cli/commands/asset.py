@@ -15,15 +15,17 @@ from ...export.mesh import FORMATS, encode
 from ...params import parameters
 from ...pictures import render
 from ...work.targets import try_file, try_folder
-from . import FAILED, OK, Arguments, intake, out, remark, say, write
+from . import FAILED, OK, Arguments, intake, out, remark, say, write, write_json
 from .settings import read
 
 if TYPE_CHECKING:
     from ...intake.asset import MeshAsset
 
 
-_NAMES = ("name", "to", "mesh")
-"""Settings that say what to do. All others are about an imported mesh."""
+MAX_FILLED = 1.1
+"""Volume of the pieces over that of the mesh above which a remark says that hollows are filled in part."""
+_NAMES = ("name", "to", "mesh", "json")
+"""Settings that say what to do and where the list goes. All others are about an imported mesh."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class AssetSettings:
     error: float
     pieces: int
     seed: int
+    json: str | None
 
     def check(self) -> None:
         """Raise `BadConfig` for settings that do not go together."""
@@ -51,6 +54,10 @@ class AssetSettings:
             raise BadConfig(f"asset needs {where}; see scengen asset --help")
         if self.to is not None and self.name is None and self.mesh is None:
             raise BadConfig(f"to = {cut(self.to)}, without an asset; give name=ASSET or mesh=FILE")
+        if self.json is not None and self.to is not None:
+            raise BadConfig(
+                "json= is for the list of assets; an imported mesh has its figures in asset.json; leave it out"
+            )
         if self.mesh is None and (
             unused := [f.name for f in fields(self) if f.name not in _NAMES and self._is_given(f)]
         ):
@@ -69,7 +76,14 @@ def command(arguments: Arguments) -> int:
     if settings.name is not None:
         return _write_mesh(settings.name, Path(str(settings.to)))
     out.print(_table())
+    if settings.json:
+        write_json(settings.json, {name: _plain(kind()) for name, kind in kits().items()})
     return OK
+
+
+def _plain(prop: Any) -> list[dict[str, Any]]:
+    """The parameters of an asset as plain data."""
+    return [{key: getattr(p, key) for key in ("name", "nominal", "low", "high", "unit")} for p in parameters(prop)]
 
 
 def _table() -> Table:
@@ -108,14 +122,17 @@ def _import_mesh(settings: AssetSettings, folder: Path) -> int:
 def _write(taken: "MeshAsset", figures: dict[str, Any], folder: Path) -> None:
     """Write the files of an asset. The figures come last: they vouch for the others."""
     from ...intake.preview import preview
+    from ...intake.urdf import files
 
+    for name, content in files(taken.prop):
+        write(folder / name, content)
     write(folder / "asset.xml", taken.xml)
     try:
         write(folder / "preview.png", render.encode(preview(taken.prop), "png"))
-        names = "asset.xml, asset.json and preview.png"
+        names = "asset.xml, asset.urdf with its meshes, asset.json and preview.png"
     except render.NoPictures as error:
         remark(f"{folder} has no preview.png: {error}")
-        names = "asset.xml and asset.json"
+        names = "asset.xml, asset.urdf with its meshes, and asset.json"
     write(folder / "asset.json", json.dumps(figures, indent=1) + "\n")
     say(f"wrote {names} in {folder}")
 
@@ -139,6 +156,13 @@ def _report(figures: dict[str, Any]) -> int:
         f"at {1000 * rest['speed']:.2f} mm/s at most"
     )
     say(_about_sides(figures))
+    if colours := figures["colours"]:
+        say(f"{colours} colour{'s' * (colours > 1)} of the file in pictures; MuJoCo's text holds no textures")
+    if count >= figures["settings"]["pieces"] > 1 or error["volume"] > MAX_FILLED:
+        limit = ", the limit," if count >= figures["settings"]["pieces"] > 1 else ""
+        what = f"{count} piece{'s' * (count > 1)}{limit} with {error['volume']:.2f} times the volume"
+        hollow = "a hollow asset with the sizes of yours (cup, bowl, dish, bin: scengen asset)"
+        remark(f"{what}: hollows are narrower than in the mesh; allow more pieces=, a smaller error=, or take {hollow}")
     if not is_accurate:
         say(f"MISSED: the error of {1000 * tolerance:g} mm; allow more pieces or a larger error")
     if not rest["rests"]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ... import compose
 from ...attack.adversary import LEAKS, TIERS
-from ...attack.campaign import AttackReport, AttackSettings, Subject, attack, certified, check_budget, drawn
+from ...attack.campaign import AttackReport, AttackSettings, Subject, attack, begun, certified, check_budget, drawn
 from ...attack.evidence import spelled
 from ...attack.priors import Prior
 from ...errors import BadConfig
@@ -20,7 +20,7 @@ from ...samplers.task import Task
 from ...samplers.task_files import search_path
 from ...work.targets import try_file, try_folder
 from ..tables import attack_table
-from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, warn, write_json
+from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, say_begun, warn, write_json
 from .settings import read
 
 LEAK_DRAWS = 200
@@ -38,6 +38,7 @@ def command(arguments: Arguments) -> int:
     check_budget("budget", settings.budget, settings.n if pool is None else min(settings.n, len(pool)))
     folder = Path(settings.to or f"generated/attack/{task.name}")
     try_folder(folder)
+    say_begun(begun(folder), "attacked scenarios", folder, settings.fresh)
     plain = asdict(_leaks(task, settings)) if settings.observed else None
     if not settings.chosen:
         if settings.json:

@@ -4,16 +4,19 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from rich.table import Table
 
 from ...compose import Combination, combinations
 from ...demos.generate import STEPS, DemosSettings, DemosSummary, generate_demonstrations
 from ...errors import BadConfig, ScengenError
+from ...runs.journal import begun
 from ...runs.progress import ProgressBar
 from ...samplers.task import Task
 from ...validate.settings import CertifySettings
-from . import FAILED, OK, Arguments, err, out, say, warn
+from ...work.targets import try_file
+from . import FAILED, OK, Arguments, err, out, say, say_begun, warn, write_json
 from .settings import read_task
 
 GENERATED = "generated"
@@ -33,6 +36,7 @@ class Run:
     def __call__(self) -> DemosSummary:
         """Make the demonstrations, and print a summary."""
         task, settings = self.task, self.settings
+        say_begun(begun(settings.folder(task)), "attempts", settings.folder(task), settings.fresh)
         with ProgressBar(err, f"{task.name}/{settings.split} demos", settings.n, settings.workers) as progress_bar:
 
             def progress(kept: int, tried: int, verdicts: Mapping[str, int], reasons: Mapping[str, int]) -> None:
@@ -62,8 +66,19 @@ def command(arguments: Arguments) -> int:
             f"repeat the command for each value of {others[0]}, with another to=" if others else "give each value once"
         )
         raise BadConfig(f"{times} of the combinations would be written to {folder}; {remedy}")
-    statuses = [OK if run().made == run.settings.n else FAILED for run in runs]
-    return max(statuses)
+    target = runs[0].settings.json
+    try_file(target)
+    summaries = [run() for run in runs]
+    if target:
+        write_json(target, [_plain(summary) for summary in summaries])
+    return max(OK if each.made == run.settings.n else FAILED for each, run in zip(summaries, runs, strict=True))
+
+
+def _plain(summary: DemosSummary) -> dict[str, Any]:
+    """A summary as plain data."""
+    manifest, made = summary.manifest, summary.demonstrations
+    counts = {name: getattr(manifest, name) for name in ("indices", "styles", "funnel", "reasons")}
+    return {"to": str(made.folder), "sha256": made.sha256, "made": summary.made, **counts, "cpu": summary.cpu}
 
 
 def _checked(requested: Combination, several: bool) -> Run:

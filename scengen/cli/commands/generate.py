@@ -14,14 +14,16 @@ from ...errors import BadConfig, ScengenError, cut
 from ...perturb.perturbation import NONE, Perturbation
 from ...pool import collection
 from ...runs.generate import GenerateSettings, Summary, generate
+from ...runs.journal import begun
 from ...runs.progress import ProgressBar
 from ...samplers.conditions import KINDS, split_under
 from ...samplers.designs import SOBOL
 from ...samplers.split import Split
 from ...samplers.task import Task
 from ...validate.settings import CertifySettings
-from ..tables import attack_table, funnel_table, summary_lines
-from . import FAILED, OK, Arguments, err, intake, out, say, warn
+from ...work.targets import try_file
+from ..tables import attack_table, funnel_table, in_words, summary_lines
+from . import FAILED, OK, Arguments, err, intake, out, say, say_begun, warn, write_json
 from .settings import read_task
 
 T = TypeVar("T")
@@ -56,6 +58,7 @@ class Run:
         if settings.sampler == "sobol" and settings.n < SOBOL:
             what = f"in {settings.n} points of a Sobol set some pairs of parameters correlate by chance"
             warn(f"scengen: {what}, up to 0.95 at 32; give n={SOBOL} or more, or sampler=lhs:{settings.n}")
+        say_begun(begun(settings.folder(task)), "draws", settings.folder(task), settings.fresh)
         rejections: Counter[str] = Counter()
         try:
             with ProgressBar(err, f"{task.name}/{settings.split}", settings.n, settings.workers) as progress_bar:
@@ -69,7 +72,7 @@ class Run:
                 summary = generate(task, self.certify_settings, settings, progress)
         except KeyboardInterrupt:
             for reason, n in rejections.most_common(MAX_REASONS):
-                warn(f"scengen: {n}x {reason}", "yellow")
+                warn(f"scengen: {n}x {in_words(reason)}", "yellow")
             raise
         out.print(funnel_table(summary.funnel, summary.reasons))
         if summary.attack is not None:
@@ -91,9 +94,14 @@ def command(arguments: Arguments) -> int:
     requested = combinations("generate", arguments)
     if not requested[0].swept:
         (run,) = map(_run, requested)
-        return OK if run().certified == run.settings.n else FAILED
+        try_file(run.settings.json)
+        summary = run()
+        if run.settings.json:
+            write_json(run.settings.json, summary.plain())
+        return OK if summary.certified == run.settings.n else FAILED
     requested, found = _valid_runs(requested)
     runs = _with_folders(requested, found)
+    try_file(runs[0].settings.json)
     say(f"{len(runs)} pools: {', '.join(str(run.settings.pool) for run in runs)}")
     summaries = []
     for run in runs:
@@ -103,6 +111,8 @@ def command(arguments: Arguments) -> int:
     folder = summaries[-1].pool.folder.parent
     use = f"pool={folder} stands for all pools in it"
     say(f"wrote {folder / collection.INDEX}: {use}, in verify, show, report, evaluate")
+    if runs[0].settings.json:
+        write_json(runs[0].settings.json, [summary.plain() for summary in summaries])
     short = any(summary.certified < run.settings.n for run, summary in zip(runs, summaries, strict=True))
     return FAILED if short else OK
 
@@ -113,7 +123,7 @@ def _progress_note(finished: int, verdicts: Mapping[str, int], rejections: "Coun
     note = ", ".join([f"{finished} tried", *lost])
     if rejections:
         ((reason, n),) = rejections.most_common(1)
-        note += f" ({n}x {cut(reason, REASON_LENGTH)})"
+        note += f" ({n}x {cut(in_words(reason), REASON_LENGTH)})"
     return note
 
 

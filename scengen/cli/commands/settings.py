@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from ...compose import certify_node, composed
+from ...compose import certify_levels, certify_node, composed
 from ...errors import BadConfig, cut
 from ...samplers.task import Task, load
 from ...samplers.task_files import groups
@@ -40,8 +40,15 @@ def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Ta
         ScengenError: one line that says what is wrong.
     """
     settings, task, plain, choices = _read_with_task(verb, overrides, kind)
-    certify_settings = typed("certify", CertifySettings, certify_node(plain["certify"], task, choices["certify"]))
+    certify_settings = typed(
+        "certify", CertifySettings, certify_node(plain["certify"], task, choices["certify"], verb, overrides)
+    )
     certify_settings.check()
+    if certify_settings.name not in (known := certify_levels(task)):
+        raise BadConfig(
+            f"certify.name = {cut(certify_settings.name)}; verify knows {', '.join(known)} and prints what differs "
+            "from them; let the file of a level start with `defaults: [quick]`, and leave its name out"
+        )
     return settings, task, certify_settings
 
 

@@ -1,7 +1,9 @@
 """print the contents of a pool or of one scenario, and draw them"""
 
+import json
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from ...errors import BadConfig
 from ...look.looks import look_named
@@ -15,11 +17,15 @@ from ...validate.playable import check_row
 from ...work.limits import at_least
 from ...work.targets import try_file
 from .. import tables
-from . import OK, Arguments, chosen, err, holder, out, remark, say, several, write
+from . import OK, Arguments, chosen, err, holder, out, remark, say, several, write, write_json
 from .settings import read
 
 MAX_DETAILED_POOLS = 3
 """Largest number of pools whose scenarios are listed. More pools get one line each."""
+
+
+NESTED = ("params", "shifted")
+"""Columns that shards store as JSON."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +38,12 @@ class ShowSettings:
     images: int
     films: bool
     look: str
+    json: str | None
 
 
 def command(arguments: Arguments) -> int:
     settings = read("show", arguments, ShowSettings)
+    try_file(settings.json)
     target, look = Path(settings.to) if settings.to else None, look_named(settings.look)
     if settings.id is None:
         at_least(settings, images=0)
@@ -52,6 +60,7 @@ def command(arguments: Arguments) -> int:
                 out.print(tables.pool_table(pool))
                 out.print(tables.funnel_table(pool.manifest.funnel, pool.manifest.reasons))
                 say(f"pool sha256: {pool.sha256}")
+        data: Any = [_plain(pool) for pool in pools]
         if target:
             with ProgressBar(err, "contact sheet", 1) as bar:
                 made = [(pool, task_of(pool, search_path(arguments))) for pool in pools]
@@ -65,6 +74,8 @@ def command(arguments: Arguments) -> int:
         row = chosen(pool, settings.id)
         for table in tables.scenario_tables(row):
             out.print(table)
+        nested = {name: json.loads(value) for name, value in row.plain().items() if name in NESTED}
+        data = {**row.plain(), **nested}
         if target:
             render.check_pictures()
             scenario = task_of(pool, search_path(arguments)).scenario(row.params)
@@ -72,4 +83,14 @@ def command(arguments: Arguments) -> int:
             write(target, render.encode(film.strip(take), "png"))
     if target:
         say(f"wrote {target}")
+    if settings.json:
+        write_json(settings.json, data)
     return OK
+
+
+def _plain(pool: Pool) -> dict[str, Any]:
+    """A pool as plain data: its scenarios by name with their parameters, and its rejection report."""
+    rows = zip(pool.names(), pool.columns("params"), strict=True)
+    scenarios = {str(name): dict(params) for name, (params,) in rows}
+    told = {name: getattr(pool.manifest, name) for name in ("n", "indices", "first_draws", "funnel", "reasons")}
+    return {"pool": str(pool.folder), "sha256": pool.sha256, "split": pool.split, **told, "scenarios": scenarios}

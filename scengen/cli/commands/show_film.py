@@ -64,7 +64,7 @@ class FilmSettings:
     def check(self) -> None:
         """Raise `BadConfig` for settings that are not valid."""
         if (self.hit is None) == (self.id is None) or (self.hit is None and self.pool is None):
-            raise BadConfig("film needs either pool=FOLDER and id=ID, or hit=FILE; see scengen show film --help")
+            raise BadConfig("show film needs either pool=FOLDER and id=ID, or hit=FILE; see scengen show film --help")
         if Path(self.to).suffix not in (".png", ".mp4"):
             raise BadConfig(f"to = {self.to}; give a .png file for a film strip or an .mp4 file for a video")
         if self.raw and self.of == WITNESS:

@@ -39,6 +39,10 @@ class SheetSettings:
     seed: int
 
 
+REMEDY = "see it with scengen show film perturb="
+"""Remedy for kinds that show only over time."""
+
+
 def command(arguments: Arguments) -> int:
     settings = read("show perturb", arguments, SheetSettings)
     look = look_named(settings.look)
@@ -62,7 +66,7 @@ def command(arguments: Arguments) -> int:
         Perturbation(((kind.name, 1),)).check((), [camera], look)
         Perturbation(((kind.name, 1),)).check_words(words)
         if not shows(kind, camera, look):
-            raise BadConfig(f"perturb = {kind.name}; a single picture does not show it")
+            raise BadConfig(f"perturb = {kind.name}; a single picture does not show it: {REMEDY}")
     scenario = task_of(pool, search_path(arguments)).scenario(row.params)
     wanted = [kind for kind in wanted if not kind.lacks(words)]
     drawn = [kind for kind in wanted if shows(kind, camera, look)]

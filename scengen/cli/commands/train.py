@@ -10,7 +10,9 @@ from ...errors import BadConfig, cut
 from ...export.dataset import CURATION, Recording
 from ...export.recording import RecordSettings, record
 from ...learn.data import KEPT, TrainingData, kept_episodes
+from ...learn.expected import expected
 from ...learn.models import KNN
+from ...learn.samples import parted
 from ...learn.train import Trained, TrainSettings, train
 from ...pool.demonstrations import Demonstrations, is_demonstrations
 from ...pool.manifest import MANIFEST
@@ -38,6 +40,11 @@ def command(arguments: Arguments) -> int:
     if data.task in tasks(search):
         if status := load_task(data.task, search).other_version("recorded with", data.task_version):
             remark(f"{recording} was {status}")
+    learned, held_out = parted(data.trajectories)
+    rows = sum(len(each.observations) for each in learned)
+    say(f"learning {data.task} from {len(learned)} demonstrations, {rows} rows; {len(held_out)} are held out")
+    if data.task in tasks(search):
+        say(expected(data.task, settings.policy))
     with ProgressBar(err, f"train {settings.policy}", settings.epochs) as progress_bar:
         trained = train(settings, data, lambda done, total, status: progress_bar.of(done, total, status))
     if not trained.losses:
@@ -48,6 +55,10 @@ def command(arguments: Arguments) -> int:
         if trained.earlier:
             say(f"{trained.earlier} of {trained.settings.epochs} epochs are from an earlier run")
         say(f"wrote {settings.to}: policy.json, weights.npz, loss.svg")
+        if trained.memorised and settings.patience is None:
+            remark(
+                f"{trained.memorised}; more demonstrations help most; patience=10 keeps the weights of the best epoch"
+            )
     say(f"next: scengen evaluate policy={settings.to} pool=...")
     return OK
 

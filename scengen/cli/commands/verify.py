@@ -400,7 +400,7 @@ def _print_report(pool: Pool, report: Report) -> None:
         say("a subset: its scenarios were chosen from another pool, and its rejection report is that of the other pool")
     if report.sample:
         share, size, seed = (report.sample[name] for name in ("excluded_share", "size", "seed"))
-        bound = f"a share of {100 * share:.3g} % or more of rows that fail this level is excluded at 95 %"
-        say(f"sample: {size} of {len(pool)} scenarios simulated, seed {seed}; without a fault, {bound}")
+        bound = f"fewer than {100 * share:.3g} % of all scenarios can fail this level (95 % confidence)"
+        say(f"sample: {size} of {len(pool)} scenarios simulated, seed {seed}; if none of them fails, {bound}")
     parts = ", ".join([f"{report.sound} sound, {report.refuted} refuted, {report.declined} declined", *done])
     say(f"{pool.folder}: {report.verdict} at level {report.level}: {parts}")

@@ -183,7 +183,8 @@ class Run:
             if found is None:
                 lost += 1
                 if lost >= MAX_LOST:
-                    raise BadConfig(f"{MAX_LOST} scenarios in a row cannot be driven; see scengen generate for reasons")
+                    why = f"{MAX_LOST} scenarios in a row cannot be driven"
+                    raise BadConfig(f"{why}; scengen generate prints the reasons, choose another task or split")
                 continue
             lost = 0
             for take in range(len(done), self.settings.takes):

@@ -113,7 +113,8 @@ def _read(path: str) -> Data:
     poses = ("eef_pos", f"eef_quat{keys.SITE}", "gripper_qpos")
     low = tuple(key for key in names if key.endswith(poses) or (key == keys.OBJECT and not pictures))
     if not pictures and keys.OBJECT not in low:
-        raise BadConfig(f"{path} has neither pictures nor {keys.OBJECT}; a policy needs one: record it again")
+        remedy = "record it with cameras, or with environment_state=true"
+        raise BadConfig(f"{path} has neither pictures nor {keys.OBJECT}, and a policy needs one; {remedy}")
     return Data(low, pictures, (width, height), names)
 
 

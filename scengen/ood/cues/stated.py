@@ -50,7 +50,7 @@ def stated(task: str, search: Sequence[str] = ()) -> dict[str, Stated]:
     try:
         node = yaml.safe_load(path.read_text()) or {}
     except yaml.YAMLError as error:
-        raise BadConfig(f"{path} is not YAML: {' '.join(str(error).split())}") from None
+        raise BadConfig(f"{path} is not YAML: {' '.join(str(error).split())}; correct it") from None
     if not isinstance(node, Mapping) or not all(isinstance(inner, Mapping) for inner in node.values()):
         raise BadConfig(f"{path} holds no decisions with status and why")
     found = {str(name): typed(f"cues.{task}.{name}", Stated, inner) for name, inner in node.items()}

@@ -21,11 +21,11 @@ from ...samplers.designs import Design
 from ...samplers.split import Split
 from ...samplers.task import Draw, Task
 from ...scenario import Scenario
-from ..certify import ACTIONS, NO_ATTACK, NOT_TRIED, lower_bound, no_ablations
+from ..certify import ACTIONS, NO_ATTACK, NOT_TRIED, no_ablations
 from ..labels import labels_of_draw, labels_of_task
 from ..rebuilt import MAX_ABSOLUTE_DIFFERENCE, MAX_RELATIVE_DIFFERENCE, rebuild
 from ..rollout import AT_REST
-from ..settings import CertifySettings
+from ..settings import CertifySettings, lower_bound
 
 NUMERICS = ("half_time_step", "twice_the_iterations")
 """Variations of the check `numerics`."""

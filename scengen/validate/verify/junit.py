@@ -4,6 +4,7 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 
+from ...installation import versions
 from .findings import Report
 
 _UNWRITABLE = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -32,6 +33,10 @@ def _suite(pool: str, report: Report) -> ET.Element:
         "name": f"scengen verify {name}", "tests": str(len(tests)), "failures": str(counts["refuted"]),
         "errors": str(counts["declined"]), "skipped": "0",
     })  # fmt: skip
+    about = {"level": report.level, "settings": report.settings, **(report.sample or {}), **versions()}
+    properties = ET.SubElement(suite, "properties")
+    for key, value in about.items():
+        ET.SubElement(properties, "property", {"name": key, "value": _UNWRITABLE.sub("?", str(value))})
     for test in tests:
         case = ET.SubElement(suite, "testcase", {"classname": name, "name": _UNWRITABLE.sub("?", test["id"])})
         if test["verdict"] != "sound":

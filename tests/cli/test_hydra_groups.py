@@ -1,0 +1,66 @@
+"""Levels of certificates in a search path, Hydra's options, and what to say instead of its settings."""
+
+import pytest
+import yaml
+
+from scengen import cli
+from scengen.cli.commands.settings import read_task
+from scengen.errors import BadConfig
+from scengen.runs.generate import GenerateSettings
+
+DOMINO = "task=domino_single"
+
+
+@pytest.fixture
+def conf(tmp_path):
+    """A search path with a level of certificates of its own."""
+    (tmp_path / "certify").mkdir()
+    (tmp_path / "certify" / "mine.yaml").write_text("defaults: [quick]\nrobust: {runs: 6}\n")
+    (tmp_path / "certify" / "called.yaml").write_text("defaults: [quick]\nname: called\n")
+    return f"hydra.searchpath={tmp_path}"
+
+
+def test_a_level_of_the_search_path_continues_ours_and_the_command_line_wins(conf):
+    _, _, level = read_task("generate", [DOMINO, "certify=mine", conf], GenerateSettings)
+    assert (level.name, level.robust.runs, level.robust.bound, level.settle) == ("quick", 6, 0.45, 1.0)
+    _, _, level = read_task("generate", [DOMINO, "certify=mine", conf, "certify.robust.bound=0.6"], GenerateSettings)
+    assert (level.robust.runs, level.robust.bound) == (6, 0.6)
+    words = [DOMINO, "certify=mine", conf, "+task.certify.robust.mass=0.01"]
+    _, _, level = read_task("generate", words, GenerateSettings)
+    assert level.robust.runs == 6 and level.robust.mass == 0.01, "settings of a task win over those of a level"
+
+
+def test_a_name_that_no_verifier_knows_is_refused_before_the_first_draw(conf):
+    with pytest.raises(BadConfig, match="verify knows full, quick and prints what differs"):
+        read_task("generate", [DOMINO, "certify=called", conf], GenerateSettings)
+
+
+def test_options_of_hydra_show_what_they_show_there(capsys):
+    assert cli.run(["generate", DOMINO, "--cfg", "job", "--resolve"]) == 0
+    job = capsys.readouterr().out
+    assert yaml.safe_load(job)["n"] == 20
+    assert cli.run(["generate", DOMINO, "--cfg", "hydra"]) == 0
+    own = capsys.readouterr().out
+    assert yaml.safe_load(own)["hydra"]["runtime"]["choices"]["task"] == "domino_single"
+    assert cli.run(["generate", DOMINO, "--cfg", "all"]) == 0
+    assert capsys.readouterr().out == job + own
+    assert cli.run(["generate", "--info", DOMINO]) == 0
+    assert all(title in capsys.readouterr().out for title in ["Defaults List"])
+
+
+@pytest.mark.parametrize(
+    ("word", "told"),
+    [
+        ("hydra.run.dir=x", "pool= or to= names the folder of the results"),
+        ("hydra.sweep.dir=x", "several values make a sweep, as in seed=1,2, and pool= or to= names its folder"),
+        ("hydra/launcher=joblib", "workers=N uses the cores of this machine, executor=ray those of a cluster"),
+        ("hydra/sweeper=optuna", "several values make a sweep"),
+        ("--config-dir=conf", "give hydra.searchpath=FOLDER"),
+        ("task.axes.mine={why: a}", "+task.axes.mine={why: ..., replace: {...}} adds an axis"),
+        ("task.id.x={a: 1}", "give a number, [uniform, low, high]"),
+    ],
+)
+def test_what_hydra_would_take_is_refused_with_what_to_give_instead(capsys, word, told):
+    assert cli.run(["generate", DOMINO, word]) == 2
+    shown = capsys.readouterr().err
+    assert told in shown and shown.count("\n") == 1
