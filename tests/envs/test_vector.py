@@ -91,7 +91,6 @@ def test_bits_are_those_of_single_environments_in_any_number_of_threads(mode):
                 seen = env.reset(options={"scenario": next(names)})[0]
 
 
-@pytest.mark.usefixtures("brief")
 @pytest.mark.parametrize("threads", [1, 2])
 def test_scenarios_with_different_numbers_of_bodies_share_an_environment(threads):
     slots, rows = 24, list(Pool.open(REFERENCE).rows())
@@ -109,6 +108,7 @@ def test_scenarios_with_different_numbers_of_bodies_share_an_environment(threads
     envs.close()
 
 
+@pytest.mark.usefixtures("brief")
 def test_scenarios_are_handed_out_in_the_order_of_the_pool_each_once():
     _, ids = played(2, "SameStep", slots=2)
     order = [row.id for row in Pool.open(REFERENCE).rows(witness=False)]
