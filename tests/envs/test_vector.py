@@ -91,6 +91,23 @@ def test_bits_are_those_of_single_environments_in_any_number_of_threads(mode):
                 seen = env.reset(options={"scenario": next(names)})[0]
 
 
+@pytest.mark.parametrize("threads", [1, 2])
+def test_scenarios_with_different_numbers_of_bodies_share_an_environment(threads):
+    slots, rows = 24, list(Pool.open(REFERENCE).rows())
+    envs = PoolVectorEnv("domino_single", REFERENCE, slots, threads)
+    envs.reset(seed=0)
+    assert len({env.world.model.nbody for env in envs.envs}) == 4, "four numbers of tiles"
+    witnesses = [rows[slot % len(rows)].witness for slot in range(slots)]
+    for step in range(STEPS):
+        envs.step(np.array([witness[step] for witness in witnesses]))
+    for slot, env in enumerate(envs.envs[: len(rows)]):
+        single = World.load(rows[slot].scene_xml)
+        for action in rows[slot].witness[:STEPS]:
+            single.step_filtered(action)
+        assert {other.world.digest for other in envs.envs[slot :: len(rows)]} == {single.digest} == {env.world.digest}
+    envs.close()
+
+
 @pytest.mark.usefixtures("brief")
 def test_scenarios_are_handed_out_in_the_order_of_the_pool_each_once():
     _, ids = played(2, "SameStep", slots=2)
