@@ -343,7 +343,7 @@ def passed_filter(witness: np.ndarray) -> bool:
     """Whether the teleoperation filter can give these actions, starting from rest."""
     if np.abs(witness).max(initial=0.0) > 1.0:
         return False
-    motion = witness.reshape(len(witness), -1, ACTION)[..., :MOTION].astype(float)
+    motion = witness.reshape(len(witness), witness.shape[1] // ACTION, ACTION)[..., :MOTION].astype(float)
     before = np.concatenate([np.zeros_like(motion[:1]), motion[:-1]])
     lowest = np.maximum(-LARGEST_CHANGE, ALPHA * (-1.0 - before))
     highest = np.minimum(LARGEST_CHANGE, ALPHA * (1.0 - before))
