@@ -149,7 +149,7 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, capsys, arguments, s
 
 def test_a_file_has_one_environment(tmp_path):
     """The command makes a file for each task; who calls it in Python is told."""
-    pools = [str(REFERENCE), str(REFERENCE.parents[1] / "tests/checker/base/ball_id")]
+    pools = [str(REFERENCE), str(REFERENCE.parents[2] / "tests/checker/base/ball_id")]
     settings = RecordSettings(pool=pools, to=str(tmp_path / "out.hdf5"), format="robomimic", cameras="none")
     with pytest.raises(BadConfig, match="has one environment"):
         record(settings, lambda *_: None)
