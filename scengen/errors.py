@@ -4,11 +4,9 @@
 """
 
 import difflib
-import sysconfig
 import traceback
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib import metadata
 from pathlib import Path
 from types import FrameType
 
@@ -128,6 +126,8 @@ def _package(frame: FrameType) -> str:
 @cache
 def _is_foreign(file: str, package: str) -> bool:
     """Whether a file is neither scengen's nor that of Python or of an installed package that does not build on it."""
+    import sysconfig
+
     path, installed = Path(file), sysconfig.get_paths()
     if not path.is_file() or path.is_relative_to(Path(__file__).parent):
         return False
@@ -138,6 +138,8 @@ def _is_foreign(file: str, package: str) -> bool:
 
 def _builds_on_scengen(package: str) -> bool:
     """Whether the distribution of a package requires scengen, as one with tasks does."""
+    from importlib import metadata  # here, because it takes 20 ms
+
     names = metadata.packages_distributions().get(package, [])
     required = [line for name in names for line in metadata.requires(name) or []]
     return any(line.split(";")[0].strip().startswith("scengen") for line in required)

@@ -168,6 +168,8 @@ class Scenario(abc.ABC):
 
     def under(self, conditions: Conditions | None) -> Self:
         """This scenario under other conditions of control."""
+        if conditions == self.conditions:
+            return self
         posed = copy.copy(self)
         object.__setattr__(posed, "conditions", conditions)
         return posed

@@ -44,8 +44,8 @@ class Replay(torch.nn.Module):
 def lerobot_verdicts(pools: list[str], lines: str) -> dict[str, bool]:
     """Whether each scenario is solved in LeRobot's rollout, by id; lines of the episodes are written into a folder."""
     first = next(Pool.open(pools[0]).rows(witness=False))
-    told = {"lines": lines, "policy_name": "replay"}
-    config, found = ScengenEnv(task=first.task, pool=",".join(pools), fps=100, **told), {}
+    config = ScengenEnv(task=first.task, pool=",".join(pools), fps=100, lines=lines, policy_name="replay")
+    found: dict[str, bool] = {}
     memory = Library([Pool.open(folder) for folder in pools]).of_split("id")
     for vector in (batches[0] for batches in config.create_envs(n_envs=1).values()):
         env = vector.envs[0].unwrapped

@@ -126,14 +126,14 @@ class ScengenBenchmark(StepBenchmark):
     def get_step_result(self, step_result: StepResult) -> EpisodeResult:
         """Success, and the reason of a failure."""
         info = step_result.info
-        told = {"scenario": self._running.row.id, "perturb": self._running.drawn.plain()}
-        return {"success": bool(info["success"]), "reason": info["reason"], **told}
+        labels = {"scenario": self._running.row.id, "perturb": self._running.drawn.plain()}
+        return {"success": bool(info["success"]), "reason": info["reason"], **labels}
 
     def get_metadata(self) -> dict[str, Any]:
         """Number of steps until the longest time limit, and settings."""
         seconds = Loop.PERIOD * self.settings["action_repeat"]
-        told = {name: self.settings[name] for name in ("settle", "perturb", "perturb_seed")}
-        return {"max_steps": round(self.horizon / seconds) + 1, **told}
+        chosen = {name: self.settings[name] for name in ("settle", "perturb", "perturb_seed")}
+        return {"max_steps": round(self.horizon / seconds) + 1, **chosen}
 
     def get_hold_action(self, last_action: Action | None) -> Action:
         """No displacement, and the last gripper command."""

@@ -109,9 +109,10 @@ def slid(player: Player, arm: Arm) -> Iterator[Attempt]:
 
 def beside(player: Player, arm: Arm) -> Iterator[Attempt]:
     """An open jaw waits with one finger beside the path of a body that moves by itself, and closes when it is there."""
-    for body in player.trace.handled:
+    restless = moving(player)
+    for body in (body for body in player.trace.handled if body in restless):
         place = player.trace.hand_at(arm.number, body)
-        if place is None or body not in moving(player):
+        if place is None:
             continue
         row = next(row for row, pair in player.trace.events if body in pair)
         closing = player.trace.rots[row, arm.number][:, 0]

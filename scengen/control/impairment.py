@@ -81,7 +81,7 @@ class Impairment:
         return cls._of(numbers)
 
     @classmethod
-    def _of(cls, numbers: "Callable[[str], NDArray[np.float64] | None]") -> Self:
+    def _of(cls, numbers: Callable[[str], NDArray[np.float64] | None]) -> Self:
         given = {field.name: numbers(field.name) for field in fields(cls)}
         found = {name: value for name, value in given.items() if value is not None}
         for name, value in found.items():
@@ -153,5 +153,4 @@ class Channel:
 
     @state.setter
     def state(self, late: NDArray[np.float64]) -> None:
-        """Actions under way, a copy. Assign it to continue from there."""
         self._late[:] = late.reshape(self._late.shape)

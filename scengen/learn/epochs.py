@@ -11,7 +11,7 @@ network in jax 0.7.1 (compiled, one core, in turn) 0.65 to 0.9 s. This saves too
 import math
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,15 @@ INTERRUPTED = "Training interrupted by user"
 """Beginning of the warning of scikit-learn about Ctrl-C."""
 DECAY = 1e-4
 """Weight of the squared norm of the weights."""
+
+
+def best_epoch(losses: Sequence[tuple[float, float]]) -> int:
+    """Number of the epoch with the lowest held-out loss, from 1; 0 before the first.
+
+    Args:
+        losses: losses after each epoch, of demonstrations that were learned from, and of held-out ones.
+    """
+    return 1 + int(np.argmin([held_out for _, held_out in losses])) if losses else 0
 
 
 class Training:
@@ -97,7 +106,7 @@ class Training:
     @property
     def best_epoch(self) -> int:
         """Number of the epoch with the lowest held-out loss, from 1; 0 before the first."""
-        return 1 + int(np.argmin([held_out for _, held_out in self.losses])) if self.losses else 0
+        return best_epoch(self.losses)
 
     @property
     def is_over(self) -> bool:

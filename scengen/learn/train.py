@@ -21,7 +21,7 @@ from ..pool.files import sha256
 from ..work.limits import at_least
 from ..work.targets import refused, try_folder, write
 from .data import MIN_EPISODES, TrainingData
-from .epochs import Training
+from .epochs import Training, best_epoch
 from .features import Features
 from .models import BC, KINDS, KNN
 from .samples import parted, samples_of, scaling_of
@@ -98,13 +98,12 @@ class Trained:
     def memorised(self) -> str:
         """A line about a policy that memorised its demonstrations: the error of those fell on, and that of the
         held-out ones rose; empty for others."""
-        if not self.losses:
+        if not (best := best_epoch(self.losses)):
             return ""
-        (learned, held_out), best = self.losses[-1], min(range(len(self.losses)), key=lambda k: self.losses[k][1])
-        then, lowest = self.losses[best]
+        (learned, held_out), (then, lowest) = self.losses[-1], self.losses[best - 1]
         if held_out <= RISE * lowest or learned >= then:
             return ""
-        rose = f"the held-out error rose from {lowest:.3g} after epoch {best + 1} to {held_out:.3g}"
+        rose = f"the held-out error rose from {lowest:.3g} after epoch {best} to {held_out:.3g}"
         return f"{rose}, while that of the demonstrations fell: the policy memorised them"
 
 

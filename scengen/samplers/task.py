@@ -300,7 +300,7 @@ class Task:
             kept = {name: u for name, u in trained.quantiles.items() if name not in shifts}
             posed = self.conditions(split)
             for tried in self._tries(shifts, trained.scenario, kept, seed, index, design):
-                yield replace(tried, scenario=tried.scenario.under(posed))
+                yield replace(tried, scenario=tried.scenario.under(posed)) if posed else tried
 
     def _tries(
         self,

@@ -108,11 +108,6 @@ class Trial:
     ):
         """
         Args:
-            scenario: see `certify`.
-            horizon: see `certify`.
-            settings: see `certify`.
-            embodiment: see `certify`.
-            adversary: see `certify`.
             to_the_end: whether rollouts go on after what a check asks is decided, as in certificates of earlier
                 releases: verdicts are the same, and some numbers differ.
         """

@@ -7,8 +7,8 @@ A chance is taken to fall along a logistic curve between two plateaus, one above
 likelihood of a breaking point is its mean over slopes and plateaus of a grid. Two more candidates never cross the
 value: lines that stay above it, and lines that stay below it. The interval holds all candidates whose likelihood is
 near enough to the largest one. `MARGIN` is larger than for independent looks, because earlier looks decide on later
-ones and on the end of the search; the fewer the looks, the larger it is. tests/evaluate/test_threshold.py simulates how
-often intervals hold the breaking point, for curves of other shapes, too.
+ones and on the end of the search; the fewer the looks, the larger it is. tests/evaluate/test_threshold_search.py
+simulates how often intervals hold the breaking point, for curves of other shapes, too.
 
 A chance that rises again belongs to no such curve. All pairs of levels are compared by the likelihood ratio of two
 chances against one. While a higher level looks better than a lower one, the next looks go to this pair. If the ratio
