@@ -163,10 +163,15 @@ def _answer(task: Task) -> list[Any]:
 
 
 def _questions(task: str) -> str:
-    """Hash of the questions and sub-goals of a task; empty if it has none."""
+    """Hash of the questions and sub-goals of a task; empty if it has none.
+
+    Rules that prompts state are left out: no answer depends on them.
+    """
     path = facts_file(task) if task in known_tasks() else None
-    questions = yaml.safe_load(path.read_text()) if path else ""
-    return hashlib.sha256(json.dumps(questions, sort_keys=True).encode()).hexdigest()[:12] if path else ""
+    if not path:
+        return ""
+    questions = {key: value for key, value in yaml.safe_load(path.read_text()).items() if key != "rules"}
+    return hashlib.sha256(json.dumps(questions, sort_keys=True).encode()).hexdigest()[:12]
 
 
 QUANTILES = (1e-9, 0.25, 0.5, 0.75, 1.0 - 1e-9)
