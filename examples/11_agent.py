@@ -14,8 +14,9 @@ from scengen.cli import run
 
 
 def answer(prompt):
-    things = dict(re.findall(r"(.+): position \[(.*?)\]", prompt))
-    first, slab = (np.array(things[name].split(","), float) for name in ("first domino", "red slab"))
+    boxes = re.findall(r"(.+): position \[(.*?)\].*size \[(.*?)\]", prompt)  # middles [m]
+    feet = {name: np.fromstring(at, sep=",") - [0, 0, float(size.split(",")[2]) / 2] for name, at, size in boxes}
+    first, slab = feet["first domino"], feet["red slab"]
     along = (slab - first) / np.linalg.norm(slab - first)
     ways = ((-0.05, 0.15), (-0.05, 0.06), (0.03, 0.06), (-0.06, 0.06))  # behind, down, push, back [m]
     moves = [("MoveEEF", {"pos": list(first + way * along + [0, 0, up]), "ticks": 100}) for way, up in ways]

@@ -31,7 +31,9 @@ EXTRAS = {"08_train": ("sklearn", "train"), "09_mesh": ("coacd", "mesh"), "12_cl
 """Packages that scripts need, and the extras that install them."""
 NEED_PICTURES = ("01_look",)
 """Scripts that draw."""
-WITHOUT_DISPLAY = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+FOREIGN = ("DISPLAY", "WAYLAND_DISPLAY", "COLUMNS")
+"""Variables of a test run that change what a script prints or opens."""
+WITHOUT_DISPLAY = {name: value for name, value in os.environ.items() if name not in FOREIGN}
 
 
 def script(path):
