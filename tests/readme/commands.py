@@ -44,6 +44,7 @@ APART = {
     "scengen train policy=bc data=generated/domino-demos": "200 demonstrations are recorded: minutes",
     "scengen evaluate policy=policies/domino": "the policy is not trained",
     "scengen evaluate policy=replay edition=v1": "certifies 40 scenarios: minutes",
+    "scengen evaluate threshold": "certifies 50 scenarios: 3 minutes of processor time",
     "scengen edition edition=mine.yaml": "certifies 40 scenarios: minutes",
     "scengen curate stats": "the recording is not made",
     "scengen evaluate policy=lerobot_env_scengen": "needs an environment with LeRobot",
