@@ -52,6 +52,10 @@ class PoolError(ScengenError):
     """A pool is missing, damaged or locked, or does not belong to the run that wants to write it."""
 
 
+class OtherVersions(PoolError):
+    """A pool was certified with a MuJoCo or robosuite that is not installed, so that nothing can be judged here."""
+
+
 class Unstable(ScengenError):
     """MuJoCo raised a warning, so that nothing simulated after it is valid."""
 

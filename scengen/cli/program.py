@@ -17,13 +17,15 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from ..errors import BadConfig, ForeignCode, ScengenError, cut, nearest, place_of
+from ..errors import BadConfig, ForeignCode, OtherVersions, ScengenError, cut, nearest, place_of
 from .verbs import COMMANDS, CONTINUING, FORMS, GROUPS, ONLY_FORMS, RENAMED, VERBS, file_stem, parsed
 
 OK = 0
 """Exit status of a command that succeeded."""
 BAD_INPUT = 2
 """Exit status after wrong input or a fault of the machine."""
+DECLINED = 3
+"""Exit status if something cannot be judged with what is installed here."""
 INTERRUPTED = 130
 """Exit status after Ctrl-C."""
 COMPLETING = ("--completion", "--complete")
@@ -122,7 +124,7 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
     """Run one command.
 
     Returns:
-        Exit status: 0 success, 1 a check failed, 2 bad input or a fault of the machine, 130 interrupted.
+        Exit status: 0 success, 1 a check failed, 2 bad input or a fault of the machine, 3 no verdict, 130 interrupted.
     """
     try:
         return _run(argv, signals)
@@ -147,7 +149,8 @@ def _status_of(error: Exception) -> int:
     if isinstance(error, ForeignCode):
         return _failed(str(error), _write_traceback(error))
     if isinstance(error, ScengenError):
-        return _failed(f"{place}: {error}" if place else str(error))
+        status = _failed(f"{place}: {error}" if place else str(error))
+        return DECLINED if isinstance(error, OtherVersions) else status
     if isinstance(error, BrokenPipeError):
         sys.stderr.close()
         return OK

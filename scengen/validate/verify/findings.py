@@ -22,6 +22,8 @@ from .recheck import MADE_AGAIN
 class Report:
     """Result of the verification of a pool."""
 
+    pool_sha256: str
+    """Hash of the pool's manifest."""
     verdict: Verdict
     level: str
     checked: int
@@ -56,7 +58,7 @@ class Report:
     remarks: list[str]
     """Facts that a reader should know although nothing is wrong."""
     examinations: list[dict[str, Any]]
-    """`id`, `verdict` and `reason` of every scenario."""
+    """`id`, `verdict` and `reason` of every scenario, whether it was `simulated`, and the `seconds` that it took."""
     names: dict[str, str]
     """Names of the scenarios in `failed`, by id."""
 
@@ -68,8 +70,8 @@ class Report:
 class Findings:
     """Collects findings."""
 
-    def __init__(self, level: str):
-        self.level = level
+    def __init__(self, level: str, pool_sha256: str):
+        self.level, self.pool_sha256 = level, pool_sha256
         self.task_versions: list[int] = []
         self.claimed_checks: list[str] = []
         self.failed: list[dict[str, str]] = []
@@ -163,6 +165,7 @@ class Findings:
         simulated = sum(e.simulated for e in self.examinations)
         failed = self.failed + [f for f in faults if f["verdict"] != "sound"]
         return Report(
+            pool_sha256=self.pool_sha256,
             verdict=self.pool_verdict,
             level=self.level,
             checked=len(verdicts),
@@ -183,7 +186,10 @@ class Findings:
             differences=self.differences,
             sample=self.sample,
             remarks=self.remarks,
-            examinations=faults,
+            examinations=[
+                {**fault, "simulated": e.simulated, "seconds": e.seconds}
+                for fault, e in zip(faults, self.examinations, strict=True)
+            ],
             names={id_: self.names[id_] for f in failed if (id_ := f["id"]) in self.names},
         )
 
