@@ -91,6 +91,18 @@ def cut(text: str, most: int = SHOWN_LENGTH) -> str:
     return text if len(text) <= most else f"{text[:most]}..."
 
 
+def contrasted(one: str, other: str, most: int = 60) -> tuple[str, str]:
+    """Two texts that differ, cut where they agree: at most `most` characters of each, with their first difference."""
+    pairs, shorter = enumerate(zip(one, other, strict=False)), min(len(one), len(other))
+    first = next((place for place, (a, b) in pairs if a != b), shorter)
+    begin = max(0, first - most // 3) if max(len(one), len(other)) > most else 0
+
+    def shown(text: str) -> str:
+        return f"{'...' if begin else ''}{cut(text[begin:], most)}"
+
+    return shown(one), shown(other)
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """The clause ` (did you mean 'x'?)`, or an empty text if no known name is close."""
     close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6) if len(name) <= SHOWN_LENGTH else []

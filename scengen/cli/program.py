@@ -1,6 +1,7 @@
 """The command line: a verb, then Hydra overrides. `scengen generate task=domino_single split=diagonal n=100`."""
 
 import ast
+import io
 import os
 import re
 import signal
@@ -15,7 +16,7 @@ from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn, TextIO
 
 from ..errors import BadConfig, ForeignCode, OtherVersions, ScengenError, cut, nearest, place_of
 from .verbs import COMMANDS, CONTINUING, FORMS, GROUPS, ONLY_FORMS, RENAMED, VERBS, file_stem, parsed
@@ -46,8 +47,7 @@ def main() -> NoReturn:
     """Run one verb and leave with its exit status."""
     signals = Signals()
     warnings.showwarning = print_warning
-    for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]  # a name need not be Unicode
+    sys.stdout, sys.stderr = _lasting(sys.stdout), _lasting(sys.stderr)
     status = run(sys.argv[1:], signals)
     if status == INTERRUPTED:
         with suppress(OSError):
@@ -55,6 +55,32 @@ def main() -> NoReturn:
         signals.end()  # at once: Python takes seconds to take itself apart on a busy machine
     signals.finish(status)
     sys.exit(status)
+
+
+class LastingFile(io.FileIO):
+    """A file that discards what a pipe refuses because its reader has gone, as `| head` does.
+
+    The command goes on and ends with its own status.
+    """
+
+    def write(self, data: Any) -> int:
+        """Write some bytes, or discard them."""
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self.fileno())
+            os.close(nowhere)
+            return super().write(data)
+
+
+def _lasting(stream: TextIO | None) -> TextIO:
+    """A standard stream that outlives its reader and can print names that are not Unicode; nowhere if it is closed."""
+    if stream is None:
+        return open(os.devnull, "w")
+    lines = stream.line_buffering or stream.write_through  # type: ignore[attr-defined]  # PYTHONUNBUFFERED sets the latter
+    file = io.BufferedWriter(LastingFile(stream.fileno(), "w", closefd=False))
+    return io.TextIOWrapper(file, stream.encoding, "backslashreplace", line_buffering=lines)
 
 
 class Signals:
@@ -151,9 +177,6 @@ def _status_of(error: Exception) -> int:
     if isinstance(error, ScengenError):
         status = _failed(f"{place}: {error}" if place else str(error))
         return DECLINED if isinstance(error, OtherVersions) else status
-    if isinstance(error, BrokenPipeError):
-        sys.stderr.close()
-        return OK
     if isinstance(error, MemoryError) or NO_MEMORY in str(error):
         return _failed(OUT_OF_MEMORY, _write_traceback(error))
     if isinstance(error, OSError):

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from rich.table import Table
 
@@ -91,6 +90,9 @@ def command(arguments: Arguments) -> int:
     try_file(settings.json)
     try_file(settings.junit)
     if settings.hits is not None:
+        for name in ("sample", "ycb", "apart", "json", "junit"):
+            if getattr(settings, name) is not None:
+                raise BadConfig(f"{name} is not for hits: leave it out")
         return _replay_hits(settings.hits, settings.pool, search_path(arguments))
     if settings.results is not None:
         return _audit_results(Path(settings.results), settings, search_path(arguments))
@@ -160,12 +162,17 @@ def _verify_pools(
         reports[folder] = found[folder] = _with_scans(report, pool, settings.ycb)
         _print_report(pool, found[folder])
     if settings.json:
-        plain = {f: {key: value for key, value in vars(report).items() if key != "names"} for f, report in found.items()}
+        plain = {folder: _plain(report) for folder, report in found.items()}
         write_json(settings.json, plain[folders[0]] if len(folders) == 1 else plain)
     verdicts = Counter(report.verdict for report in found.values())
     if len(folders) > 1:
         say(f"{len(folders)} pools: {', '.join(f'{verdicts[v]} {v}' for v in STATUS)}")
     return next(status for verdict, status in WORST.items() if verdicts[verdict])
+
+
+def _plain(report: Report) -> dict[str, object]:
+    """A report as plain data."""
+    return {key: value for key, value in vars(report).items() if key != "names"}
 
 
 def without_expired(arguments: Arguments) -> Arguments:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...certificate import CHECKS
-from ...errors import PoolError, cut
+from ...errors import PoolError, contrasted, cut
 from ...installation import versions
 from ...pool.manifest import MANIFEST
 from ...samplers.task import Task
@@ -210,7 +210,8 @@ def wrong_names(installed: Task, stored: Task) -> Iterator[str]:
     for name in ("code", "category"):
         here, there = getattr(installed, name), getattr(stored, name)
         if here != there:
-            yield f"the {name} is {there[:60]!a}, that of the task is {here!a}"
+            told, own = contrasted(ascii(there), ascii(here))
+            yield f"the {name} is {told}, that of the task is {own}"
 
 
 def differences(installed: Any, stored: Any, key: str = "") -> Iterator[dict[str, str]]:
@@ -220,7 +221,8 @@ def differences(installed: Any, stored: Any, key: str = "") -> Iterator[dict[str
             below = f"{key}.{name}".strip(".")
             yield from differences(installed.get(name, _ABSENT), stored.get(name, _ABSENT), below)
     elif installed != stored:
-        yield {"key": key, "pool": _shown(stored), "installed": _shown(installed)}
+        told, here = contrasted(_shown(stored), _shown(installed), 200)
+        yield {"key": key, "pool": told, "installed": here}
 
 
 _ABSENT: Any = object()
@@ -231,4 +233,4 @@ def _shown(value: Any) -> str:
     if value is _ABSENT:
         return "(not there)"
     text = str(value)
-    return (text if text.isascii() and text.isprintable() else ascii(text)[1:-1])[:200]
+    return text if text.isascii() and text.isprintable() else ascii(text)[1:-1]
