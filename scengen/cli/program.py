@@ -231,8 +231,7 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     if verb == "--complete":
         out.print("\n".join(completions(" ".join(arguments), VERBS)), soft_wrap=True)
         return OK
-    if verb in ("generate", "demos"):  # multiple values are a sweep there, with or without Hydra's option
-        arguments = [a for a in arguments if a not in ("-m", "--multirun")]
+    arguments = [a for a in arguments if a not in ("-m", "--multirun")]  # multiple values say it by themselves
     flags = [a for a in arguments if a.startswith("-")]
     if flags and flags[0].partition("=")[0] in SHOW_OPTIONS:
         return _show(verb, arguments)
