@@ -190,8 +190,8 @@ EXPERIMENT = "experiment"
 def config_name(verb: str, overrides: Sequence[str] = ()) -> str:
     """Name of the file of a command in its `config_dir`.
 
-    Hydra looks for groups that overrides add (`+experiment=heavy`) beside the file that it starts from. They are beside
-    the folder of a command's file, and a file with the name of the command stands there for it.
+    Hydra looks for groups that overrides add (`+experiment=heavy`) in the folder of the file that it starts from, which
+    must not be command/ then: a file of the same name in the folder above stands for it.
     """
     file = command_file(verb).stem
     if not groups(verb):

@@ -78,7 +78,7 @@ def _lasting(stream: TextIO | None) -> TextIO:
     """A standard stream that outlives its reader and can print names that are not Unicode; nowhere if it is closed."""
     if stream is None:
         return open(os.devnull, "w")
-    lines = stream.line_buffering or stream.write_through  # type: ignore[attr-defined]  # PYTHONUNBUFFERED sets the latter
+    lines = bool(stream.line_buffering or stream.write_through)  # type: ignore[attr-defined]  # PYTHONUNBUFFERED sets the latter
     file = io.BufferedWriter(LastingFile(stream.fileno(), "w", closefd=False))
     return io.TextIOWrapper(file, stream.encoding, "backslashreplace", line_buffering=lines)
 

@@ -59,7 +59,11 @@ def experiments(tmp_path):
 def test_an_experiment_chooses_files_and_sets_values_and_the_command_line_wins(experiments):
     settings, task, level = read_task("generate", ["+experiment=heavy", experiments], GenerateSettings)
     assert (settings.n, settings.split, task.name) == (3, "diagonal", "domino_single")
-    assert (level.name, level.robust.runs) == ("full", 16) and task.node["id"]["tile"]["mass"] == ["uniform", 0.03, 0.04]
+    assert (level.name, level.robust.runs) == ("full", 16) and task.node["id"]["tile"]["mass"] == [
+        "uniform",
+        0.03,
+        0.04,
+    ]
     words = ["+experiment=heavy", experiments, "n=7", "certify.robust.runs=9", "certify=quick"]
     settings, _, level = read_task("generate", words, GenerateSettings)
     assert (settings.n, level.name, level.robust.runs) == (7, "quick", 9)

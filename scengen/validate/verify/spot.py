@@ -12,7 +12,7 @@ def excluded_share(total: int, sample: int) -> float:
 
 
 def bound(total: int, sample: int, rows: str) -> str:
-    """What a sample without a false row shows, in words.
+    """The largest share of false rows after a sample without one, as text.
 
     Args:
         rows: what the rows are, such as "scenarios".
