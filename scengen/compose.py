@@ -414,7 +414,7 @@ def _one_by_one(verb: str, override: Override) -> str:
     shown = [*map(shlex.quote, values[:LISTED]), *(["..."] if len(values) > LISTED else [])]
     target = next((f" {name}=NAME-$x" for name in ("to", "json") if name in _known(verb)), "")
     loop = f"for x in {' '.join(shown)}; do scengen {verb} ... {key}=$x{target}; done"
-    return f"{verb} takes one at a time (generate and demos take several): {loop}"
+    return f"{verb} takes one at a time (generate and demos take several); repeat it: {loop}"
 
 
 def _lists(verb: str) -> list[str]:

@@ -89,7 +89,7 @@ def _more(verb: str, groups: Sequence[str], takes_pool: bool, overrides: Sequenc
         numbers = yaml.safe_load((task_files.conf_dir() / "certify" / "quick.yaml").read_text())
         yield from _wrapped("#  ", [f"certify.{key}={value}" for key, value in _flat(numbers)])
     if "task" in groups or takes_pool:
-        yield "# hydra.searchpath=[file:///path/to/conf]   folder with the tasks of a package that is not installed"
+        yield "# hydra.searchpath=FOLDER   folder with task/, certify/ or experiment/ (+experiment=NAME) of your own"
     yield f"# --cfg job prints the composed configuration, --info {'|'.join(task_files.ORIGINS)} its origin"
 
 

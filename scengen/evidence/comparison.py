@@ -51,7 +51,8 @@ class Difference:
     level: Level
 
     def __str__(self) -> str:
-        was, now = contrasted(*("nothing" if value is NOTHING else str(value) for value in (self.stored, self.now)), 80)
+        was, now = ("nothing" if value is NOTHING else str(value) for value in (self.stored, self.now))
+        was, now = contrasted(was, now, 80)
         return f"{self.task}: {self.kind}: {self.what}: {was} is now {now}"
 
 
