@@ -1,4 +1,4 @@
-"""Certificates in words: the numbers of each check as people read them, with units and at most three digits."""
+"""Certificates as text: the numbers of each check as people read them, with units and at most three digits."""
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
