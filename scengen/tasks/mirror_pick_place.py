@@ -73,7 +73,7 @@ TRAINING_VIEW = VIEWS[1]  # orientation that a policy learns here: the paper's
 class MirrorPickPlace(Scenario):
     """One cube on the table, and pictures that are not upright."""
 
-    VERSION = 2
+    VERSION = 3
     HOLD = 0.3
     NO_ABLATIONS = "the cube is lifted with the hand alone, and what is turned is the picture, which no scene holds"
 
@@ -105,8 +105,11 @@ class MirrorPickPlace(Scenario):
     def means(self) -> Mapping[str, Mean]:
         def between(world: World) -> bool:
             at = world.arm.hand_rot.T @ (world.com("cube") - world.arm.hand)
+            half = np.abs(world.arm.hand_rot.T @ world.rot("cube")) @ self.cube.size / 2
+            behind_tips = at[2] < half[2]  # the tips of level fingers that sweep the table meet its front
             before_palm = at[2] > -self.cube.size[2] / 2  # a palm that sweeps the table meets a cube nearer to itself
-            return bool(abs(at[0]) < world.arm.gap / 2 and abs(at[1]) < self.cube.edge / 2 and before_palm)
+            beside = abs(at[0]) < world.arm.gap / 2 and abs(at[1]) < self.cube.edge / 2
+            return bool(beside and behind_tips and before_palm)
 
         return {
             "the cube stood between the fingers when the robot first touched it": when(
