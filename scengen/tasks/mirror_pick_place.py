@@ -62,6 +62,9 @@ LIFT_HEIGHT = 0.04
 MIN_PICTURE_OFFSET = 0.12
 """Least distance between the cube and where the picture shows it [m]: the open jaw reaches 66 mm to either side of the
 hand and half a diagonal of the cube is 42 mm, so that a hand that goes there does not even touch the cube."""
+MIN_CLEARANCE = 0.002
+"""Least distance between palm and cube when the robot first touches the cube [m]: the oracle keeps 6 mm. Level fingers
+that sweep the table like a fork meet the cube with their tips, or with the palm."""
 APPROACH_HEIGHT = 0.10  # height above the grasp from which the hand comes down [m]
 VIEWS = (UPRIGHT, Orientation(2), Orientation(0, True), Orientation(2, True), Orientation(1))
 """Orientations by `view`: upright, turned by 180 deg, left and right exchanged, above and below exchanged, a quarter
@@ -106,10 +109,8 @@ class MirrorPickPlace(Scenario):
         def between(world: World) -> bool:
             at = world.arm.hand_rot.T @ (world.com("cube") - world.arm.hand)
             half = np.abs(world.arm.hand_rot.T @ world.rot("cube")) @ self.cube.size / 2
-            behind_tips = at[2] < half[2]  # the tips of level fingers that sweep the table meet its front
-            before_palm = at[2] > -self.cube.size[2] / 2  # a palm that sweeps the table meets a cube nearer to itself
             beside = abs(at[0]) < world.arm.gap / 2 and abs(at[1]) < self.cube.edge / 2
-            return bool(beside and behind_tips and before_palm)
+            return bool(beside and -PALM_ABOVE + MIN_CLEARANCE < at[2] - half[2] < 0.0)  # from palm to pads
 
         return {
             "the cube stood between the fingers when the robot first touched it": when(
