@@ -18,7 +18,7 @@ FRESH = "give fresh=true to move them aside, or choose another to="
 
 
 def recorded(path: Path) -> int:
-    """Number of records in a log that begins with its identity, which may be another one; 0 if there is none."""
+    """Number of records in a log whose first line is its identity, which may be another one; 0 if there is none."""
     return max(0, len(path.read_bytes().splitlines()) - 1) if path.is_file() else 0
 
 
