@@ -23,7 +23,7 @@ from ..validate.settings import FEWEST, lower_bound
 from ..validate.verify.claims import alike
 from ..work.fingerprint import fingerprint
 from ..work.limits import at_least
-from ..work.log import Log
+from ..work.log import FRESH, Log, recorded
 from ..work.parallel import Limits, Workers, each
 from ..work.plain import read_plain, why_not_plain
 from ..work.targets import move_aside, write
@@ -249,7 +249,7 @@ def attack(
     }
     if settings.fresh and begun(folder):
         move_aside(folder)
-    with Log(folder / LOG, identity, "give fresh=true to move them aside, or choose another to=") as log:
+    with Log(folder / LOG, identity, FRESH) as log:
         done = {record["scenario"] for record in log.records}
         todo = [k for k, one in enumerate(subjects) if one.scenario.id not in done]
         limits = Limits(settings.limit_seconds, settings.limit_mb)
@@ -267,7 +267,7 @@ def attack(
 
 def begun(folder: Path) -> int:
     """Number of scenarios that earlier attacks into a folder have finished, those of a refused identity included."""
-    return max(0, len((folder / LOG).read_bytes().splitlines()) - 1) if (folder / LOG).is_file() else 0
+    return recorded(folder / LOG)
 
 
 def check_budget(setting: str, budget: int, scenarios: int) -> None:

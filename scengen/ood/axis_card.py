@@ -36,6 +36,7 @@ class AxisSettings:
     seed: int = 0
     rounds: int = 20
     workers: Workers = 1
+    fresh: bool = False
     to: str | None = None
 
     def check(self, task: Task) -> None:

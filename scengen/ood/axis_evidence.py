@@ -11,7 +11,8 @@ from ..samplers.split import ID
 from ..samplers.task import Task
 from ..scenario import Scenario
 from ..validate.settings import CertifySettings
-from ..work.targets import write
+from ..work.log import recorded
+from ..work.targets import move_aside, write
 from . import behaviour, boundary, features
 from .analysis.distance import Energy
 from .analysis.distance import energy as energy_distance
@@ -20,6 +21,16 @@ from .axis_card import NOT_SEARCHED, AxisCard, AxisSettings
 from .axis_card_page import write_page
 from .baseline import verdict
 from .belief import measure_belief
+
+LOGS = ("twins.jsonl", "any.jsonl", "beliefs.jsonl", "boundary.jsonl")
+"""Logs of a card in its folder."""
+CONTROLS = ("own.jsonl", "any.jsonl")
+"""Logs of what was played in training."""
+
+
+def begun(folder: Path) -> int:
+    """Number of twins and trials that earlier runs have finished for a card."""
+    return sum(recorded(folder / name) for name in LOGS)
 
 
 def make_axis_card(
@@ -38,6 +49,8 @@ def make_axis_card(
     Returns:
         The card, and the reason why it has no pictures; empty if it has them.
     """
+    if settings.fresh:
+        move_aside(*(folder / name for name in LOGS), *(_controls(task, settings, folder) / name for name in CONTROLS))
     evidence = features.sampled(task, settings.axis)  # first: it takes no rollouts, and may find no feasible index
     made = _certified(task, certify_settings, settings, folder, progress)
     card = _card(task, settings, evidence, made, folder, progress)
@@ -54,7 +67,7 @@ def _card(
     progress: Callable[[str, int, int], None],
 ) -> AxisCard:
     """The card: evidence on features, certified scenarios, and what else is measured for it."""
-    controls = (folder if settings.to else folder.parent) / f"{task.name}-{ID}"
+    controls = _controls(task, settings, folder)
     memories, oracle = behaviour.measure(task, settings.axis, folder, controls, settings.trials, progress)
     baselines = [*memories, *measure_belief(task, settings.axis, folder, settings.trials, progress)]
     boundaries, why_no_path = _boundaries(task, settings, folder, progress)
@@ -82,6 +95,11 @@ def _card(
     )
 
 
+def _controls(task: Task, settings: AxisSettings, folder: Path) -> Path:
+    """Folder of what is played in training, which cards of other axes share unless a folder is given."""
+    return (folder if settings.to else folder.parent) / f"{task.name}-{ID}"
+
+
 def _certified(
     task: Task,
     certify_settings: CertifySettings,
@@ -94,7 +112,12 @@ def _certified(
     if not n:
         return None
     wanted = generate.GenerateSettings(
-        split=settings.axis, n=n, seed=settings.seed, workers=settings.workers, pool=str(folder / "pool")
+        split=settings.axis,
+        n=n,
+        seed=settings.seed,
+        workers=settings.workers,
+        fresh=settings.fresh,
+        pool=str(folder / "pool"),
     )
     return generate.generate(task, certify_settings, wanted, lambda done, *_: progress("certify twins", done, n))
 

@@ -32,7 +32,7 @@ from ..scenario import Scenario
 from ..validate.identity import source_sha256
 from ..validate.rebuilt import world_of
 from ..validate.rollout import replay, run
-from ..work.log import Log
+from ..work.log import FRESH, Log
 from ..work.parallel import Limits, Workers, each
 from .baseline import MOTION, OBJECT_CENTRIC, Baseline
 
@@ -123,7 +123,7 @@ def play_indices(
     shifts = {name: str(dist) for name, dist in task.shifts(split).items()}
     identity = {"task": task.name, "split": split, "shifts": shifts, "seed": trials.seed, "library": LIBRARY_SIZE}
     identity["source"] = source_sha256(task.family)
-    with Log(where, identity) as log:
+    with Log(where, identity, FRESH) as log:
         todo = sorted(set(range(count)) - {r["index"] for r in log.records})
         if todo:
             prepare()

@@ -25,7 +25,7 @@ from ..samplers.split import ID
 from ..samplers.support import distance
 from ..samplers.task import Task
 from ..validate.identity import source_sha256
-from ..work.log import Log
+from ..work.log import FRESH, Log
 from . import threshold
 from .behaviour import try_both, twin_actions
 from .threshold import Bools, Floats, Ints
@@ -164,7 +164,7 @@ def search(
         "fixed": [float(points[i]) for i in fixed],
         "source": source_sha256(task.family),
     }
-    with Log(folder / "boundary.jsonl", identity) as log:
+    with Log(folder / "boundary.jsonl", identity, FRESH) as log:
         for index in range(len(log.records), rounds * TRIALS_PER_ROUND):
             point = fixed[index] if index < len(fixed) else _next_point(log.records, points, seed)
             if point is None:

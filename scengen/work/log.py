@@ -13,6 +13,14 @@ from ..errors import BadConfig
 from .plain import MAX_JOURNAL, read_plain
 from .targets import refused, write
 
+FRESH = "give fresh=true to move them aside, or choose another to="
+"""Remedy of a command that can start over."""
+
+
+def recorded(path: Path) -> int:
+    """Number of records in a log whose first line is its identity, which may be another one; 0 if there is none."""
+    return max(0, len(path.read_bytes().splitlines()) - 1) if path.is_file() else 0
+
 
 class Log:
     """Plain records in a file, after a first line that says what they depend on. One writer at a time."""

@@ -5,11 +5,11 @@ from pathlib import Path
 from rich.table import Table
 
 from ...ood.axis_card import AxisCard, AxisSettings
-from ...ood.axis_evidence import make_axis_card
+from ...ood.axis_evidence import begun, make_axis_card
 from ...ood.baseline import BELIEF, Baseline
 from ...runs.progress import ProgressBar
 from ...work.targets import try_folder
-from . import OK, Arguments, err, out, remark, say
+from . import OK, Arguments, err, out, remark, say, say_begun
 from .settings import read_task
 
 
@@ -18,6 +18,7 @@ def command(arguments: Arguments) -> int:
     settings.check(task)
     folder = Path(settings.to or f"generated/axes/{task.name}-{settings.axis}")
     try_folder(folder)
+    say_begun(begun(folder), "twins and trials", folder, settings.fresh)
     with ProgressBar(err, f"probe {task.name}/{settings.axis}", settings.n, settings.workers) as progress_bar:
 
         def progress(what: str, done: int, total: int) -> None:

@@ -6,12 +6,13 @@ from rich.table import Table
 
 from ...errors import UnknownName
 from ...ood.discovery.proposal import Finding
-from ...ood.discovery.search import METHODS, MIN_BUDGET, DiscoverSettings, SearchResult, discover
+from ...ood.discovery.search import METHODS, MIN_BUDGET, TRIALS, DiscoverSettings, SearchResult, discover
 from ...runs.progress import ProgressBar
 from ...samplers.axis import spell
 from ...work.limits import at_least
+from ...work.log import recorded
 from ...work.targets import try_folder
-from . import OK, Arguments, err, out, say, write
+from . import OK, Arguments, err, out, say, say_begun, write
 from .settings import read_task
 
 
@@ -22,6 +23,7 @@ def command(arguments: Arguments) -> int:
         raise UnknownName("method", settings.method, METHODS)
     folder = Path(settings.to or f"generated/discover/{task.name}")
     try_folder(folder)
+    say_begun(recorded(folder / TRIALS), "trials", folder, settings.fresh)
     with ProgressBar(err, f"discover {task.name}", settings.budget, settings.workers) as progress_bar:
 
         def progress(what: str, done: int, total: int) -> None:

@@ -29,8 +29,9 @@ from ...samplers.task import Task
 from ...scenario import Scenario
 from ...validate.identity import source_sha256
 from ...validate.settings import CertifySettings
-from ...work.log import Log
+from ...work.log import FRESH, Log
 from ...work.parallel import Workers, each
+from ...work.targets import move_aside
 from .boxes import boxes
 from .candidates import (
     NARROW,
@@ -67,6 +68,8 @@ from .trial import (
     play_search_trial,
 )
 
+TRIALS = "trials.jsonl"
+"""Name of the log of a search."""
 FOREST = "forest"
 """Method that learns from the trials so far where to look."""
 HYPERCUBE = "hypercube"
@@ -95,6 +98,7 @@ class DiscoverSettings:
     method: str = FOREST
     seed: int = 0
     workers: Workers = 1
+    fresh: bool = False
     to: str | None = None
 
 
@@ -140,6 +144,8 @@ def discover(
     """
     if settings.method == FOREST:
         forest_class()  # before any work, to say at once that it is missing
+    if settings.fresh:
+        move_aside(folder / TRIALS)
     known = regions(task)
     with _SearchRun(task, checks, settings, known, folder, progress) as run:
         _search(run, known, settings)
@@ -207,7 +213,7 @@ class _SearchRun:
             "seed": settings.seed,
             "controls": CONTROLS_PER_TWIN,
         }
-        self.log = Log(folder / "trials.jsonl", identity)
+        self.log = Log(folder / TRIALS, identity, FRESH)
         self.trials: list[SearchTrial] = []
         """Trials in the order in which they ended: with several workers any order."""
         self.spent = 0
