@@ -18,6 +18,7 @@ from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..sim.world import World
 from ..validate.playable import check_row, stored_world
+from ..validate.sentences import lines
 from .player import Player
 from .scene import FAULTS, SceneView, filmed, one_line
 from .seen import Seen
@@ -214,7 +215,7 @@ class Browser:
             "task": task,
             "moved": [moved(task, name, value) for name, value in row.shifted.items()],
             "params": [(task.known[name], value) for name, value in row.params.items() if name in task.known],
-            "checks": row.certificate.checks,
+            "lines": list(lines(row.certificate.checks)),
             "command": f"scengen try {' '.join(words)} film=try.mp4",
             "best": best,
         }

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 from helpers import REFERENCE
 
-from scengen.cli.certificates import certificate_table, found
-from scengen.cli.tables import in_words
+from scengen.cli.tables import certificate_table, in_words
 from scengen.pool import Pool
+from scengen.validate.sentences import found
 
 
 def check(row, name):

@@ -1,30 +1,35 @@
 """Certificates as text: the numbers of each check as people read them, with units and at most three digits."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from rich.table import Table
-
 from ..certificate import Check
-from ..pool import PoolRow
 
 Numbers = Mapping[str, Any]
 """Numbers of a check."""
 
 
-def certificate_table(row: PoolRow) -> Table:
-    """A line for each check, and one for each shortcut and each ablation."""
-    title = f"certificate: {row.certificate.verdict} ({row.certificate.settings})"
-    table = Table(title=title, title_justify="left")
-    table.add_column("check", no_wrap=True)
-    table.add_column("passed")
-    table.add_column("found")
-    for check in row.certificate.checks:
+@dataclass(frozen=True)
+class Line:
+    """What one check, or one of its plans, has found."""
+
+    name: str
+    """Name of the check, of the shortcut or of the ablation."""
+    passed: str
+    """Whether the check passed, as text; empty for a plan."""
+    found: str
+    """Finding, as text."""
+    is_part: bool = False
+    """Whether it is a plan of the check above it."""
+
+
+def lines(checks: Iterable[Check]) -> Iterator[Line]:
+    """A line for each check, and one for each shortcut and each ablation below it."""
+    for check in checks:
         mark = {True: "yes", False: "NO", None: "nothing to check" if check.waived else "skipped"}[check.passed]
-        table.add_row(check.name, mark, check.reason or found(check))
-        for name, told in _parts(check):
-            table.add_row(f"  {name}", "", told)
-    return table
+        yield Line(check.name, mark, check.reason or found(check))
+        yield from (Line(name, "", told, is_part=True) for name, told in _parts(check))
 
 
 def found(check: Check) -> str:
