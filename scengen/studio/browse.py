@@ -31,9 +31,9 @@ CAMERA: Vec3 = np.array([0.9, -0.75, 1.45])
 """Position of the camera for one scenario [m]: above the free corner of the table."""
 LOOK_AT: Vec3 = np.array([-0.15, 0.05, 0.9])
 """Point that it looks at [m]."""
-CAMERA_FOR_TWO: Vec3 = np.array([1.6, 0.95, 1.75])
-"""Position of the camera for a scenario and its twin [m]. The panel hides the right part of the picture."""
-LOOK_AT_FOR_TWO: Vec3 = np.array([-0.2, 0.95, 0.8])
+CAMERA_FOR_TWO: Vec3 = np.array([1.6, 0.7, 1.75])
+"""Position of the camera for a scenario and its twin [m]."""
+LOOK_AT_FOR_TWO: Vec3 = np.array([-0.2, 0.7, 0.85])
 """Point that it looks at [m]."""
 
 
@@ -173,7 +173,7 @@ class Browser:
                 return
             self._look(CAMERA_FOR_TWO, LOOK_AT_FOR_TWO)
             world = World.load(twin_scene(self.pool, self.task, row), self.task.embodiment, look=ROOM)
-            self._twin.show(world, TWIN_OFFSET, robot=False)
+            self._twin.show(world, TWIN_OFFSET, robot=False, room=False)
             self._label = self._client.scene.add_label("/twin_label", "training twin", position=LABEL_OFFSET)
 
     def _look(self, position: Vec3, target: Vec3) -> None:

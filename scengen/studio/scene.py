@@ -26,6 +26,7 @@ FACES = {
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): 128,
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): 480,
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): 1280,
+    int(mujoco.mjtGeom.mjGEOM_PLANE): 2,
 }
 """Numbers of triangles of geoms that are not meshes, by type."""
 NO_COLOUR = (0.5, 0.5, 0.5, 1.0)
@@ -45,6 +46,12 @@ PEDESTAL_GRID = 2.0**-6
 """The same as `GRID` for a pedestal [m]: 16 mm. Its plates have gaps, over which edges cannot be collapsed."""
 STILL = 1e-5
 """Smallest change of a pose that is sent [m, and of a quaternion]."""
+SKY = 2.2
+"""Intensity of the light from everywhere. A lamp has 3."""
+GROUND_LIGHT = (190, 185, 180)
+"""Colour of this light from below, which walls and the floor reflect."""
+EXPOSURE = 0.72
+"""Factor on colours, under which light things keep them."""
 FRAME_PERIODS = 4
 """Number of control periods between two frames: 25 frames a second."""
 FAULTS = (ScengenError, ValueError, KeyError, TypeError, IndexError, ArithmeticError, RecursionError)
@@ -92,15 +99,12 @@ def filmed(world: World, scenario: Scenario, actions: Actions, horizon: float, r
 
 
 def light(api: viser.SceneApi) -> None:
-    """Light a scene from above and from the free corner of the table.
-
-    Sky and sun together reflect about as much as falls in, so that light things keep their colours; under viser's own
-    lights they become white. Shadows are left out: without a graphics card they take most of the time of a picture.
+    """Light a scene with viser's lamps, which throw shadows, and with light from everywhere, for which shadows are not
+    black. `EXPOSURE` keeps light things from becoming white.
     """
-    api.configure_default_lights(enabled=False)
+    api.configure_default_lights(cast_shadow=True)
     api.configure_environment_map(hdri=None)
-    api.add_light_hemisphere("/sky", ground_color=(150, 150, 160), intensity=1.5)
-    api.add_light_directional("/sun", intensity=1.8, position=(1.0, -1.0, 3.0))
+    api.add_light_hemisphere("/sky", ground_color=GROUND_LIGHT, intensity=SKY)
 
 
 class SceneView:
@@ -116,7 +120,12 @@ class SceneView:
         self._sent: Poses | None = None
 
     def show(
-        self, world: World, offset: Iterable[float] = (0.0, 0.0, 0.0), robot: bool = True, exposure: float = 1.0
+        self,
+        world: World,
+        offset: Iterable[float] = (0.0, 0.0, 0.0),
+        robot: bool = True,
+        room: bool = True,
+        exposure: float = EXPOSURE,
     ) -> None:
         """Show a world in place of what was shown.
 
@@ -124,6 +133,7 @@ class SceneView:
             world: a world with visual geoms.
             offset: position of its origin [m].
             robot: whether to show the robot.
+            room: whether to show floor and walls. Walls are seen from inside alone.
             exposure: factor on all colours, for lights other than those of `light`.
 
         Raises:
@@ -135,7 +145,7 @@ class SceneView:
             faces := sum(_faces(world.model, geom) for body in bodies for geom in _shown(world.model, body))
         ) > MAX_FACES:
             raise PoolError(f"the scene has {faces} triangles; at most {MAX_FACES} are shown")
-        meshes = {body: _meshes(world.model, body, _simplification(world, body)) for body in bodies}
+        meshes = {body: _meshes(world.model, body, _simplification(world, body), room) for body in bodies}
         self.clear()
         self._api.add_frame(self._root, show_axes=False, position=np.array(list(offset)))
         poses = poses_of(world)
@@ -185,11 +195,13 @@ def _simplification(world: World, body: int) -> Simplification:
 
 
 def _meshes(
-    model: mujoco.MjModel, body: int, simplification: Simplification
+    model: mujoco.MjModel, body: int, simplification: Simplification, planes: bool = True
 ) -> list[tuple[trimesh.Trimesh, NDArray[np.float32]]]:
     """The visible geoms of a body in its axes, joined by colour."""
     found: dict[bytes, list[trimesh.Trimesh]] = {}
     for geom in _shown(model, body):
+        if not planes and model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
+            continue
         if (mesh := _mesh(model, geom)) is not None:
             transform, turn = np.eye(4), np.zeros(9)
             mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
@@ -268,6 +280,9 @@ def _mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:
             return trimesh.creation.capsule(2 * b, a, count=(16, 16))
         case kinds.mjGEOM_ELLIPSOID:
             return trimesh.creation.icosphere(3, 1.0).apply_scale((a, b, c))
+        case kinds.mjGEOM_PLANE if a > 0 and b > 0:
+            corners = [[x * a, y * b, 0.0] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+            return trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
         case kinds.mjGEOM_MESH:
             mesh = int(model.geom_dataid[geom])
             vertices = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]]
