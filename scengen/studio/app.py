@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import viser
 
-from .browse import CAMERA, LOOK_AT, Browser, Shelf
+from .browse import CAMERA, FIELD_OF_VIEW, LOOK_AT, Browser, Shelf
 from .driving import DrivePage, Driver
 from .judge import Desk, Judge
 from .scene import light
@@ -89,7 +89,7 @@ class Page:
     """Page of one browser. Two browsers look at different things."""
 
     def __init__(self, client: viser.ClientHandle, content: Content):
-        client.camera.position, client.camera.look_at = CAMERA, LOOK_AT
+        client.camera.position, client.camera.look_at, client.camera.fov = CAMERA, LOOK_AT, FIELD_OF_VIEW
         gui, tabs = client.gui, client.gui.add_tab_group()
         self.browser: Browser | None = None
         self.judge: Judge | None = None

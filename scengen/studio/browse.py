@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from ..errors import ScengenError
 from ..geometry import Vec3
 from ..look.looks import ROOM
 from ..pictures import film
@@ -27,13 +28,15 @@ TWIN_OFFSET: Vec3 = np.array([0.0, 1.4, 0.0])
 """Position of the training twin, at the side of the scenario [m]: the table is 0.8 m wide."""
 LABEL_OFFSET: Vec3 = np.array([0.0, 1.4, 1.3])
 """Position of the label of the training twin [m], above its table."""
-CAMERA: Vec3 = np.array([0.9, -0.75, 1.45])
+FIELD_OF_VIEW = np.radians(45.0)
+"""Vertical angle of the camera [rad]: that of MuJoCo's viewer."""
+CAMERA: Vec3 = np.array([1.6, -1.25, 1.9])
 """Position of the camera for one scenario [m]: above the free corner of the table."""
-LOOK_AT: Vec3 = np.array([-0.15, 0.05, 0.9])
+LOOK_AT: Vec3 = np.array([-0.12, 0.0, 0.92])
 """Point that it looks at [m]."""
-CAMERA_FOR_TWO: Vec3 = np.array([1.6, 0.7, 1.75])
+CAMERA_FOR_TWO: Vec3 = np.array([2.9, 0.7, 2.2])
 """Position of the camera for a scenario and its twin [m]."""
-LOOK_AT_FOR_TWO: Vec3 = np.array([-0.2, 0.7, 0.85])
+LOOK_AT_FOR_TWO: Vec3 = np.array([-0.1, 0.7, 0.9])
 """Point that it looks at [m]."""
 
 
@@ -79,6 +82,7 @@ class Browser:
         self._pool = gui.add_dropdown("pool", labels)
         self._place = gui.add_number("scenario", 1, min=1, max=max(1, len(shelf.pools[0])), step=1)
         self._find = gui.add_text("find id", "")
+        self._missing = gui.add_html("")
         self._steps = gui.add_button_group("", ("previous", "next"))
         self._beside = gui.add_checkbox("training twin", True)
         self._what: viser.GuiDropdownHandle[str] = gui.add_dropdown("play", [str(film.WITNESS)])
@@ -199,10 +203,15 @@ class Browser:
         self.player.outcome.content = template("studio_fault.html").render(note=f"{name}: {made.outcome}")
 
     def _found(self) -> None:
-        text = str(self._find.value).strip()
+        """Go to the scenario of an id or name. If there is none, a line says so, and the page stays as it is."""
+        text, told = str(self._find.value).strip(), ""
         if text:
             pool = self.pool
-            self._place.value = pool.directory.find(text, pool.name_at, str(pool.folder)) + 1
+            try:
+                self._place.value = pool.directory.find(text, pool.name_at, str(pool.folder)) + 1
+            except ScengenError as error:
+                told = one_line(error)
+        self._missing.content = template("studio_fault.html").render(fault=told)
 
     def _description(self, row: PoolRow, best: str) -> str:
         """Description of the scenario with units; texts of the pool are escaped."""

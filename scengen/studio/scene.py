@@ -10,10 +10,12 @@ import numpy as np
 import trimesh
 import viser
 from numpy.typing import NDArray
+from PIL import Image
 
 from ..control.loop import Loop
 from ..episode import STRICT, Actions, Episode, Rules
 from ..errors import PoolError, ScengenError, cut
+from ..look import room as room_look
 from ..pictures.render import hide_hulls
 from ..scenario import Scenario
 from ..sim.world import World
@@ -50,8 +52,12 @@ SKY = 2.2
 """Intensity of the light from everywhere. A lamp has 3."""
 GROUND_LIGHT = (190, 185, 180)
 """Colour of this light from below, which walls and the floor reflect."""
-EXPOSURE = 0.72
+EXPOSURE = 0.85
 """Factor on colours, under which light things keep them."""
+ROOM_BODY = 0
+"""MuJoCo's world body, which holds the floor and the walls: they throw no shadows on the table."""
+BOARDS = (room_look.TABLE.name, room_look.FLOOR.name)
+"""Materials of the room whose textures are shown; others have their mean colour."""
 FRAME_PERIODS = 4
 """Number of control periods between two frames: 25 frames a second."""
 FAULTS = (ScengenError, ValueError, KeyError, TypeError, IndexError, ArithmeticError, RecursionError)
@@ -150,7 +156,7 @@ class SceneView:
         self._api.add_frame(self._root, show_axes=False, position=np.array(list(offset)))
         poses = poses_of(world)
         for body, parts in meshes.items():
-            if not parts:
+            if not parts and not any(_is_board(world.model, geom) for geom in _shown(world.model, body)):
                 continue
             # Nodes have numbers for names: those of untrusted bodies could hold anything, such as slashes.
             self._frames[body] = self._api.add_frame(
@@ -164,7 +170,10 @@ class SceneView:
                     color=np.round(255 * exposure * colour[:3]).astype(np.uint8),
                     opacity=None if colour[3] >= 1.0 else float(colour[3]),
                     flat_shading=True,
+                    cast_shadow=body != ROOM_BODY,
                 )
+            for number, mesh in enumerate(_boards(world.model, body, exposure, room)):
+                self._api.add_mesh_trimesh(f"{self._root}/{body}/board_{number}", mesh, cast_shadow=body != ROOM_BODY)
         self._sent = poses
 
     def move(self, poses: Poses) -> None:
@@ -200,16 +209,57 @@ def _meshes(
     """The visible geoms of a body in its axes, joined by colour."""
     found: dict[bytes, list[trimesh.Trimesh]] = {}
     for geom in _shown(model, body):
-        if not planes and model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
+        if _is_board(model, geom) or (not planes and model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE):
             continue
         if (mesh := _mesh(model, geom)) is not None:
-            transform, turn = np.eye(4), np.zeros(9)
-            mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-            transform[:3, :3], transform[:3, 3] = turn.reshape(3, 3), model.geom_pos[geom]
-            mesh.apply_transform(transform)
+            mesh.apply_transform(_pose(model, geom))
             found.setdefault(np.round(_colour(model, geom), 3).astype(np.float32).tobytes(), []).append(mesh)
     joined = ((trimesh.util.concatenate(parts), np.frombuffer(key, np.float32)) for key, parts in found.items())
     return [(simplification(mesh), colour) for mesh, colour in joined if isinstance(mesh, trimesh.Trimesh)]
+
+
+def _pose(model: mujoco.MjModel, geom: int) -> NDArray[np.float64]:
+    """Pose of a geom in the axes of its body, shape (4, 4)."""
+    transform, turn = np.eye(4), np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+    transform[:3, :3], transform[:3, 3] = turn.reshape(3, 3), model.geom_pos[geom]
+    return transform
+
+
+def _is_board(model: mujoco.MjModel, geom: int) -> bool:
+    """Whether a geom is the table top or the floor of the room, whose texture is shown."""
+    kind, material = model.geom_type[geom], int(model.geom_matid[geom])
+    flat = kind in (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_PLANE)
+    return bool(flat and material >= 0 and model.mat(material).name in BOARDS)
+
+
+def _boards(model: mujoco.MjModel, body: int, exposure: float, room: bool) -> Iterator[trimesh.Trimesh]:
+    """The boards of a body in its axes, with their textures."""
+    for geom in _shown(model, body):
+        plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+        if not _is_board(model, geom) or (plane and not room) or (mesh := _mesh(model, geom)) is None:
+            continue
+        triangles, normals = mesh.triangles, np.repeat(mesh.face_normals, 3, axis=0)
+        vertices = triangles.reshape(-1, 3)
+        along = np.argsort(np.abs(normals), axis=1, kind="stable")[:, :2]
+        places = np.take_along_axis(vertices, np.sort(along, axis=1), axis=1)
+        material = int(model.geom_matid[geom])
+        visual = trimesh.visual.TextureVisuals(
+            uv=places * model.mat_texrepeat[material],
+            material=trimesh.visual.material.PBRMaterial(
+                baseColorTexture=_tinted(model, geom, exposure), metallicFactor=0.0, roughnessFactor=1.0
+            ),
+        )
+        made = trimesh.Trimesh(vertices, np.arange(len(vertices)).reshape(-1, 3), visual=visual, process=False)
+        yield made.apply_transform(_pose(model, geom))
+
+
+def _tinted(model: mujoco.MjModel, geom: int, exposure: float) -> Image.Image:
+    """Texture of a geom in its colour."""
+    texture = model.mat_texid[model.geom_matid[geom], mujoco.mjtTextureRole.mjTEXROLE_RGB]
+    start, shape = model.tex_adr[texture], (model.tex_height[texture], model.tex_width[texture], 3)
+    pixels = model.tex_data[start : start + np.prod(shape)].reshape(shape)
+    return Image.fromarray(np.clip(exposure * model.geom_rgba[geom][:3] * pixels, 0, 255).astype(np.uint8))
 
 
 def _rounded(mesh: trimesh.Trimesh, grid: float) -> trimesh.Trimesh:

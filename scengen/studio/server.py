@@ -114,7 +114,9 @@ def _kind(path: str) -> str:
 def _with(page: bytes, added: Iterable[str]) -> bytes:
     """viser's page with scripts and style sheets of ours, after its own."""
     tags = (
-        f'<link rel="stylesheet" href="{path[1:]}">' if path.endswith(".css") else f'<script src="{path[1:]}" defer></script>'
+        f'<link rel="stylesheet" href="{path[1:]}">'
+        if path.endswith(".css")
+        else f'<script src="{path[1:]}" defer></script>'
         for path in added
     )
     head, end, body = page.rpartition(b"</head>")
