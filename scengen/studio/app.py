@@ -16,7 +16,7 @@ STYLES = "studio.css"
 PAD = "pad.js"
 """File that reads pads and keys in the browser."""
 PANEL_WIDTH = 400
-"""Width of the panel beside the scene [pixels]."""
+"""Width of the panel to the right of the scene [pixels]."""
 
 
 @dataclass(frozen=True)

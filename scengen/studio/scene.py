@@ -11,6 +11,8 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 from PIL import Image
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
 
 from ..control.loop import Loop
 from ..episode import STRICT, Actions, Episode, Rules
@@ -244,9 +246,9 @@ def _boards(model: mujoco.MjModel, body: int, exposure: float, room: bool) -> It
         along = np.argsort(np.abs(normals), axis=1, kind="stable")[:, :2]
         places = np.take_along_axis(vertices, np.sort(along, axis=1), axis=1)
         material = int(model.geom_matid[geom])
-        visual = trimesh.visual.TextureVisuals(
+        visual = TextureVisuals(
             uv=places * model.mat_texrepeat[material],
-            material=trimesh.visual.material.PBRMaterial(
+            material=PBRMaterial(
                 baseColorTexture=_tinted(model, geom, exposure), metallicFactor=0.0, roughnessFactor=1.0
             ),
         )
@@ -257,8 +259,8 @@ def _boards(model: mujoco.MjModel, body: int, exposure: float, room: bool) -> It
 def _tinted(model: mujoco.MjModel, geom: int, exposure: float) -> Image.Image:
     """Texture of a geom in its colour."""
     texture = model.mat_texid[model.geom_matid[geom], mujoco.mjtTextureRole.mjTEXROLE_RGB]
-    start, shape = model.tex_adr[texture], (model.tex_height[texture], model.tex_width[texture], 3)
-    pixels = model.tex_data[start : start + np.prod(shape)].reshape(shape)
+    start, height, width = (int(each[texture]) for each in (model.tex_adr, model.tex_height, model.tex_width))
+    pixels = model.tex_data[start : start + height * width * 3].reshape(height, width, 3)
     return Image.fromarray(np.clip(exposure * model.geom_rgba[geom][:3] * pixels, 0, 255).astype(np.uint8))
 
 
