@@ -18,7 +18,7 @@ from ..samplers.axis import Axis, spell
 from ..samplers.dists import Fixed
 from ..samplers.task import ID, Task
 from ..samplers.task_files import About
-from ..validate.sentences import lines
+from .certificates import certificate_table
 
 LINES = 1000
 """Largest number of scenarios in a table of a pool; id= finds the others."""
@@ -113,18 +113,6 @@ def scenario_tables(row: PoolRow) -> list[Table]:
     for name, value in row.params.items():
         params.add_row(name, f"{value:g}")
     return [about, params, certificate_table(row)]
-
-
-def certificate_table(row: PoolRow) -> Table:
-    """A line for each check, and one for each shortcut and each ablation."""
-    title = f"certificate: {row.certificate.verdict} ({row.certificate.settings})"
-    table = Table(title=title, title_justify="left")
-    table.add_column("check", no_wrap=True)
-    table.add_column("passed")
-    table.add_column("found")
-    for line in lines(row.certificate.checks):
-        table.add_row(f"  {line.name}" if line.is_part else line.name, line.passed, line.found)
-    return table
 
 
 def tasks_table(tasks: Sequence[About], certified: Mapping[str, Mapping[str, Evidence]]) -> Table:

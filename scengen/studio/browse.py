@@ -19,7 +19,7 @@ from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..sim.world import World
 from ..validate.playable import check_row, stored_world
-from ..validate.sentences import lines
+from ..validate.words import lines
 from .player import Player
 from .scene import FAULTS, SceneView, filmed, one_line
 from .seen import Seen

@@ -62,6 +62,9 @@ LIFT_HEIGHT = 0.04
 MIN_PICTURE_OFFSET = 0.12
 """Least distance between the cube and where the picture shows it [m]: the open jaw reaches 66 mm to either side of the
 hand and half a diagonal of the cube is 42 mm, so that a hand that goes there does not even touch the cube."""
+MIN_CLEARANCE = 0.002
+"""Least distance between palm and cube when the robot first touches the cube [m]: the oracle keeps 6 mm. Level fingers
+that sweep the table like a fork meet the cube with their tips, or with the palm."""
 APPROACH_HEIGHT = 0.10  # height above the grasp from which the hand comes down [m]
 VIEWS = (UPRIGHT, Orientation(2), Orientation(0, True), Orientation(2, True), Orientation(1))
 """Orientations by `view`: upright, turned by 180 deg, left and right exchanged, above and below exchanged, a quarter
@@ -73,7 +76,7 @@ TRAINING_VIEW = VIEWS[1]  # orientation that a policy learns here: the paper's
 class MirrorPickPlace(Scenario):
     """One cube on the table, and pictures that are not upright."""
 
-    VERSION = 2
+    VERSION = 3
     HOLD = 0.3
     NO_ABLATIONS = "the cube is lifted with the hand alone, and what is turned is the picture, which no scene holds"
 
@@ -105,8 +108,9 @@ class MirrorPickPlace(Scenario):
     def means(self) -> Mapping[str, Mean]:
         def between(world: World) -> bool:
             at = world.arm.hand_rot.T @ (world.com("cube") - world.arm.hand)
-            before_palm = at[2] > -self.cube.size[2] / 2  # a palm that sweeps the table meets a cube nearer to itself
-            return bool(abs(at[0]) < world.arm.gap / 2 and abs(at[1]) < self.cube.edge / 2 and before_palm)
+            half = np.abs(world.arm.hand_rot.T @ world.rot("cube")) @ self.cube.size / 2
+            beside = abs(at[0]) < world.arm.gap / 2 and abs(at[1]) < self.cube.edge / 2
+            return bool(beside and -PALM_ABOVE + MIN_CLEARANCE < at[2] - half[2] < 0.0)  # from palm to pads
 
         return {
             "the cube stood between the fingers when the robot first touched it": when(

@@ -95,7 +95,7 @@ RELEASE_HEIGHT = 0.072
 class ShelteredGrasp(Scenario):
     """An object in a rack that is open on one side, and a tray on the table before it."""
 
-    VERSION = 2
+    VERSION = 3
     CONCEALED = ("thing",)
     HOLD = 0.3
 
@@ -143,11 +143,12 @@ class ShelteredGrasp(Scenario):
         return "the thing fell off the table" if fallen(world, "thing") else None
 
     def means(self) -> Mapping[str, Mean]:
-        width, length, _ = self.thing.size
+        width, length, height = self.thing.size
 
         def between(world: World) -> bool:
             at = world.arm.hand_rot.T @ (world.com("thing") - world.arm.hand)
-            return bool(abs(at[0]) < world.arm.gap / 2 and at[2] - length / 2 < -MIN_BETWEEN)
+            beside = abs(at[0]) < world.arm.gap / 2 and abs(at[1]) < height / 2  # not above it
+            return bool(beside and at[2] - length / 2 < -MIN_BETWEEN)
 
         def closed(world: World) -> bool:
             at = about_z(self.turn).T @ (world.arm.hand - self.foot)

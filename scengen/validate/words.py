@@ -1,7 +1,6 @@
 """Certificates as text: the numbers of each check as people read them, with units and at most three digits."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from ..certificate import Check
@@ -9,27 +8,16 @@ from ..certificate import Check
 Numbers = Mapping[str, Any]
 """Numbers of a check."""
 
-
-@dataclass(frozen=True)
-class Line:
-    """What one check, or one of its plans, has found."""
-
-    name: str
-    """Name of the check, of the shortcut or of the ablation."""
-    passed: str
-    """Whether the check passed, as text; empty for a plan."""
-    found: str
-    """Finding, as text."""
-    is_part: bool = False
-    """Whether it is a plan of the check above it."""
+RESULTS = {True: "yes", False: "NO", None: "skipped"}
+"""Words for whether a check passed."""
 
 
-def lines(checks: Iterable[Check]) -> Iterator[Line]:
-    """A line for each check, and one for each shortcut and each ablation below it."""
+def lines(checks: tuple[Check, ...]) -> Iterator[tuple[str, str, str]]:
+    """A line for each check, and an indented one for each shortcut and each ablation: name, whether it passed, what it
+    has found."""
     for check in checks:
-        mark = {True: "yes", False: "NO", None: "nothing to check" if check.waived else "skipped"}[check.passed]
-        yield Line(check.name, mark, check.reason or found(check))
-        yield from (Line(name, "", told, is_part=True) for name, told in _parts(check))
+        yield check.name, "nothing to check" if check.waived else RESULTS[check.passed], check.reason or found(check)
+        yield from ((f"  {name}", "", told) for name, told in _parts(check))
 
 
 def found(check: Check) -> str:
