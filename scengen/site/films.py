@@ -71,7 +71,7 @@ def record(world: World, film: Film, path: Path) -> Recorded:
     server = open_server("127.0.0.1", 0, Guard(new_token()))  # viser records what a server would send
     try:
         view = SceneView(server.scene, "/scene")
-        view.show(world, exposure=EXPOSURE)
+        view.show(world, exposure=EXPOSURE, room=False)
         serializer = server.get_scene_serializer()
         for frame in film.frames:
             view.move(frame)

@@ -5,11 +5,18 @@ from dataclasses import dataclass
 
 import viser
 
-from .browse import CAMERA, LOOK_AT, Browser, Shelf
-from .driving import SCRIPT, DrivePage, Driver, script, with_script
+from .browse import CAMERA, FIELD_OF_VIEW, LOOK_AT, Browser, Shelf
+from .driving import DrivePage, Driver
 from .judge import Desk, Judge
 from .scene import light
 from .server import Guard, close_server, new_token, open_server
+
+STYLES = "studio.css"
+"""File that lays out the page."""
+PAD = "pad.js"
+"""File that reads pads and keys in the browser."""
+PANEL_WIDTH = 400
+"""Width of the panel to the right of the scene [pixels]."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +44,12 @@ class Studio:
         self.content, self.token = content, token or new_token()
         self._pages: dict[int, Page] = {}
         self._lock = threading.Lock()
-        guard, driver = Guard(self.token), content.driver
-        if driver is not None:
-            guard = Guard(self.token, {"/pad": driver.pad.serve}, {f"/{SCRIPT}": script()}, with_script)
-        self.server = open_server(host, port, guard)
+        driver = content.driver
+        sockets = {} if driver is None else {"/pad": driver.pad.serve}
+        self.server = open_server(host, port, Guard(self.token, sockets, [STYLES] if driver is None else [STYLES, PAD]))
         self.server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+        self.server.gui.main_panel.dock_right()
+        self.server.gui.main_panel.set_width(PANEL_WIDTH)
         light(self.server.scene)
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._left)
@@ -81,7 +89,7 @@ class Page:
     """Page of one browser. Two browsers look at different things."""
 
     def __init__(self, client: viser.ClientHandle, content: Content):
-        client.camera.position, client.camera.look_at = CAMERA, LOOK_AT
+        client.camera.position, client.camera.look_at, client.camera.fov = CAMERA, LOOK_AT, FIELD_OF_VIEW
         gui, tabs = client.gui, client.gui.add_tab_group()
         self.browser: Browser | None = None
         self.judge: Judge | None = None

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from ..errors import ScengenError
 from ..geometry import Vec3
 from ..look.looks import ROOM
 from ..pictures import film
@@ -18,6 +19,7 @@ from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..sim.world import World
 from ..validate.playable import check_row, stored_world
+from ..validate.words import lines
 from .player import Player
 from .scene import FAULTS, SceneView, filmed, one_line
 from .seen import Seen
@@ -26,13 +28,15 @@ TWIN_OFFSET: Vec3 = np.array([0.0, 1.4, 0.0])
 """Position of the training twin, at the side of the scenario [m]: the table is 0.8 m wide."""
 LABEL_OFFSET: Vec3 = np.array([0.0, 1.4, 1.3])
 """Position of the label of the training twin [m], above its table."""
-CAMERA: Vec3 = np.array([0.9, -0.75, 1.45])
+FIELD_OF_VIEW = np.radians(45.0)
+"""Vertical angle of the camera [rad]: that of MuJoCo's viewer."""
+CAMERA: Vec3 = np.array([1.6, -1.25, 1.9])
 """Position of the camera for one scenario [m]: above the free corner of the table."""
-LOOK_AT: Vec3 = np.array([-0.15, 0.05, 0.9])
+LOOK_AT: Vec3 = np.array([-0.12, 0.0, 0.92])
 """Point that it looks at [m]."""
-CAMERA_FOR_TWO: Vec3 = np.array([1.6, 0.95, 1.75])
-"""Position of the camera for a scenario and its twin [m]. The panel hides the right part of the picture."""
-LOOK_AT_FOR_TWO: Vec3 = np.array([-0.2, 0.95, 0.8])
+CAMERA_FOR_TWO: Vec3 = np.array([2.9, 0.7, 2.2])
+"""Position of the camera for a scenario and its twin [m]."""
+LOOK_AT_FOR_TWO: Vec3 = np.array([-0.1, 0.7, 0.9])
 """Point that it looks at [m]."""
 
 
@@ -78,6 +82,7 @@ class Browser:
         self._pool = gui.add_dropdown("pool", labels)
         self._place = gui.add_number("scenario", 1, min=1, max=max(1, len(shelf.pools[0])), step=1)
         self._find = gui.add_text("find id", "")
+        self._missing = gui.add_html("")
         self._steps = gui.add_button_group("", ("previous", "next"))
         self._beside = gui.add_checkbox("training twin", True)
         self._what: viser.GuiDropdownHandle[str] = gui.add_dropdown("play", [str(film.WITNESS)])
@@ -172,7 +177,7 @@ class Browser:
                 return
             self._look(CAMERA_FOR_TWO, LOOK_AT_FOR_TWO)
             world = World.load(twin_scene(self.pool, self.task, row), self.task.embodiment, look=ROOM)
-            self._twin.show(world, TWIN_OFFSET, robot=False)
+            self._twin.show(world, TWIN_OFFSET, robot=False, room=False)
             self._label = self._client.scene.add_label("/twin_label", "training twin", position=LABEL_OFFSET)
 
     def _look(self, position: Vec3, target: Vec3) -> None:
@@ -198,10 +203,15 @@ class Browser:
         self.player.outcome.content = template("studio_fault.html").render(note=f"{name}: {made.outcome}")
 
     def _found(self) -> None:
-        text = str(self._find.value).strip()
+        """Go to the scenario of an id or name. If there is none, a line says so, and the page stays as it is."""
+        text, told = str(self._find.value).strip(), ""
         if text:
             pool = self.pool
-            self._place.value = pool.directory.find(text, pool.name_at, str(pool.folder)) + 1
+            try:
+                self._place.value = pool.directory.find(text, pool.name_at, str(pool.folder)) + 1
+            except ScengenError as error:
+                told = one_line(error)
+        self._missing.content = template("studio_fault.html").render(fault=told)
 
     def _description(self, row: PoolRow, best: str) -> str:
         """Description of the scenario with units; texts of the pool are escaped."""
@@ -214,7 +224,7 @@ class Browser:
             "task": task,
             "moved": [moved(task, name, value) for name, value in row.shifted.items()],
             "params": [(task.known[name], value) for name, value in row.params.items() if name in task.known],
-            "checks": row.certificate.checks,
+            "lines": list(lines(row.certificate.checks)),
             "command": f"scengen try {' '.join(words)} film=try.mp4",
             "best": best,
         }

@@ -5,7 +5,6 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 
 import numpy as np
 import viser
@@ -28,8 +27,6 @@ from .scene import Poses, SceneView, poses_of
 
 MAX_MESSAGE = 100
 """Length of the longest message of a pad [characters]."""
-SCRIPT = "pad.js"
-"""File that reads pads and keys in the browser."""
 PICTURE = (320, 240)
 """Size of the picture that shows what a policy sees [pixels]."""
 PICTURES_PER_SECOND = 10.0
@@ -104,17 +101,6 @@ def _event(message: str) -> PadEvent:
     if isinstance(plain[1], bool) or not isinstance(plain[1], (int, float)):
         raise Malformed("the value is not a number")
     return PadEvent(plain[0], float(plain[1])).check()
-
-
-def with_script(page: bytes) -> bytes:
-    """viser's page with the script that reads pads."""
-    head, end, body = page.rpartition(b"</head>")
-    return head + f'<script src="{SCRIPT}" defer></script>'.encode() + end + body
-
-
-def script() -> bytes:
-    """The script that reads pads."""
-    return files("scengen.studio").joinpath("static", SCRIPT).read_bytes()
 
 
 class Driver:

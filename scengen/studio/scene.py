@@ -10,10 +10,14 @@ import numpy as np
 import trimesh
 import viser
 from numpy.typing import NDArray
+from PIL import Image
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
 
 from ..control.loop import Loop
 from ..episode import STRICT, Actions, Episode, Rules
 from ..errors import PoolError, ScengenError, cut
+from ..look import room as room_look
 from ..pictures.render import hide_hulls
 from ..scenario import Scenario
 from ..sim.world import World
@@ -26,6 +30,7 @@ FACES = {
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): 128,
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): 480,
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): 1280,
+    int(mujoco.mjtGeom.mjGEOM_PLANE): 2,
 }
 """Numbers of triangles of geoms that are not meshes, by type."""
 NO_COLOUR = (0.5, 0.5, 0.5, 1.0)
@@ -45,6 +50,16 @@ PEDESTAL_GRID = 2.0**-6
 """The same as `GRID` for a pedestal [m]: 16 mm. Its plates have gaps, over which edges cannot be collapsed."""
 STILL = 1e-5
 """Smallest change of a pose that is sent [m, and of a quaternion]."""
+SKY = 2.2
+"""Intensity of the light from everywhere. A lamp has 3."""
+GROUND_LIGHT = (190, 185, 180)
+"""Colour of this light from below, which walls and the floor reflect."""
+EXPOSURE = 0.85
+"""Factor on colours, under which light things keep them."""
+ROOM_BODY = 0
+"""MuJoCo's world body, which holds the floor and the walls: they throw no shadows on the table."""
+BOARDS = (room_look.TABLE.name, room_look.FLOOR.name)
+"""Materials of the room whose textures are shown; others have their mean colour."""
 FRAME_PERIODS = 4
 """Number of control periods between two frames: 25 frames a second."""
 FAULTS = (ScengenError, ValueError, KeyError, TypeError, IndexError, ArithmeticError, RecursionError)
@@ -92,15 +107,12 @@ def filmed(world: World, scenario: Scenario, actions: Actions, horizon: float, r
 
 
 def light(api: viser.SceneApi) -> None:
-    """Light a scene from above and from the free corner of the table.
-
-    Sky and sun together reflect about as much as falls in, so that light things keep their colours; under viser's own
-    lights they become white. Shadows are left out: without a graphics card they take most of the time of a picture.
+    """Light a scene with viser's lamps, which throw shadows, and with light from everywhere, for which shadows are not
+    black. `EXPOSURE` keeps light things from becoming white.
     """
-    api.configure_default_lights(enabled=False)
+    api.configure_default_lights(cast_shadow=True)
     api.configure_environment_map(hdri=None)
-    api.add_light_hemisphere("/sky", ground_color=(150, 150, 160), intensity=1.5)
-    api.add_light_directional("/sun", intensity=1.8, position=(1.0, -1.0, 3.0))
+    api.add_light_hemisphere("/sky", ground_color=GROUND_LIGHT, intensity=SKY)
 
 
 class SceneView:
@@ -116,7 +128,12 @@ class SceneView:
         self._sent: Poses | None = None
 
     def show(
-        self, world: World, offset: Iterable[float] = (0.0, 0.0, 0.0), robot: bool = True, exposure: float = 1.0
+        self,
+        world: World,
+        offset: Iterable[float] = (0.0, 0.0, 0.0),
+        robot: bool = True,
+        room: bool = True,
+        exposure: float = EXPOSURE,
     ) -> None:
         """Show a world in place of what was shown.
 
@@ -124,6 +141,7 @@ class SceneView:
             world: a world with visual geoms.
             offset: position of its origin [m].
             robot: whether to show the robot.
+            room: whether to show floor and walls. Walls are seen from inside alone.
             exposure: factor on all colours, for lights other than those of `light`.
 
         Raises:
@@ -135,12 +153,12 @@ class SceneView:
             faces := sum(_faces(world.model, geom) for body in bodies for geom in _shown(world.model, body))
         ) > MAX_FACES:
             raise PoolError(f"the scene has {faces} triangles; at most {MAX_FACES} are shown")
-        meshes = {body: _meshes(world.model, body, _simplification(world, body)) for body in bodies}
+        meshes = {body: _meshes(world.model, body, _simplification(world, body), room) for body in bodies}
         self.clear()
         self._api.add_frame(self._root, show_axes=False, position=np.array(list(offset)))
         poses = poses_of(world)
         for body, parts in meshes.items():
-            if not parts:
+            if not parts and not any(_is_board(world.model, geom) for geom in _shown(world.model, body)):
                 continue
             # Nodes have numbers for names: those of untrusted bodies could hold anything, such as slashes.
             self._frames[body] = self._api.add_frame(
@@ -154,7 +172,10 @@ class SceneView:
                     color=np.round(255 * exposure * colour[:3]).astype(np.uint8),
                     opacity=None if colour[3] >= 1.0 else float(colour[3]),
                     flat_shading=True,
+                    cast_shadow=body != ROOM_BODY,
                 )
+            for number, mesh in enumerate(_boards(world.model, body, exposure, room)):
+                self._api.add_mesh_trimesh(f"{self._root}/{body}/board_{number}", mesh, cast_shadow=body != ROOM_BODY)
         self._sent = poses
 
     def move(self, poses: Poses) -> None:
@@ -185,19 +206,62 @@ def _simplification(world: World, body: int) -> Simplification:
 
 
 def _meshes(
-    model: mujoco.MjModel, body: int, simplification: Simplification
+    model: mujoco.MjModel, body: int, simplification: Simplification, planes: bool = True
 ) -> list[tuple[trimesh.Trimesh, NDArray[np.float32]]]:
     """The visible geoms of a body in its axes, joined by colour."""
     found: dict[bytes, list[trimesh.Trimesh]] = {}
     for geom in _shown(model, body):
+        if _is_board(model, geom) or (not planes and model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE):
+            continue
         if (mesh := _mesh(model, geom)) is not None:
-            transform, turn = np.eye(4), np.zeros(9)
-            mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-            transform[:3, :3], transform[:3, 3] = turn.reshape(3, 3), model.geom_pos[geom]
-            mesh.apply_transform(transform)
+            mesh.apply_transform(_pose(model, geom))
             found.setdefault(np.round(_colour(model, geom), 3).astype(np.float32).tobytes(), []).append(mesh)
     joined = ((trimesh.util.concatenate(parts), np.frombuffer(key, np.float32)) for key, parts in found.items())
     return [(simplification(mesh), colour) for mesh, colour in joined if isinstance(mesh, trimesh.Trimesh)]
+
+
+def _pose(model: mujoco.MjModel, geom: int) -> NDArray[np.float64]:
+    """Pose of a geom in the axes of its body, shape (4, 4)."""
+    transform, turn = np.eye(4), np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+    transform[:3, :3], transform[:3, 3] = turn.reshape(3, 3), model.geom_pos[geom]
+    return transform
+
+
+def _is_board(model: mujoco.MjModel, geom: int) -> bool:
+    """Whether a geom is the table top or the floor of the room, whose texture is shown."""
+    kind, material = model.geom_type[geom], int(model.geom_matid[geom])
+    flat = kind in (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_PLANE)
+    return bool(flat and material >= 0 and model.mat(material).name in BOARDS)
+
+
+def _boards(model: mujoco.MjModel, body: int, exposure: float, room: bool) -> Iterator[trimesh.Trimesh]:
+    """The boards of a body in its axes, with their textures."""
+    for geom in _shown(model, body):
+        plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+        if not _is_board(model, geom) or (plane and not room) or (mesh := _mesh(model, geom)) is None:
+            continue
+        triangles, normals = mesh.triangles, np.repeat(mesh.face_normals, 3, axis=0)
+        vertices = triangles.reshape(-1, 3)
+        along = np.argsort(np.abs(normals), axis=1, kind="stable")[:, :2]
+        places = np.take_along_axis(vertices, np.sort(along, axis=1), axis=1)
+        material = int(model.geom_matid[geom])
+        visual = TextureVisuals(
+            uv=places * model.mat_texrepeat[material],
+            material=PBRMaterial(
+                baseColorTexture=_tinted(model, geom, exposure), metallicFactor=0.0, roughnessFactor=1.0
+            ),
+        )
+        made = trimesh.Trimesh(vertices, np.arange(len(vertices)).reshape(-1, 3), visual=visual, process=False)
+        yield made.apply_transform(_pose(model, geom))
+
+
+def _tinted(model: mujoco.MjModel, geom: int, exposure: float) -> Image.Image:
+    """Texture of a geom in its colour."""
+    texture = model.mat_texid[model.geom_matid[geom], mujoco.mjtTextureRole.mjTEXROLE_RGB]
+    start, height, width = (int(each[texture]) for each in (model.tex_adr, model.tex_height, model.tex_width))
+    pixels = model.tex_data[start : start + height * width * 3].reshape(height, width, 3)
+    return Image.fromarray(np.clip(exposure * model.geom_rgba[geom][:3] * pixels, 0, 255).astype(np.uint8))
 
 
 def _rounded(mesh: trimesh.Trimesh, grid: float) -> trimesh.Trimesh:
@@ -268,6 +332,9 @@ def _mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh | None:
             return trimesh.creation.capsule(2 * b, a, count=(16, 16))
         case kinds.mjGEOM_ELLIPSOID:
             return trimesh.creation.icosphere(3, 1.0).apply_scale((a, b, c))
+        case kinds.mjGEOM_PLANE if a > 0 and b > 0:
+            corners = [[x * a, y * b, 0.0] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+            return trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
         case kinds.mjGEOM_MESH:
             mesh = int(model.geom_dataid[geom])
             vertices = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]]

@@ -8,8 +8,9 @@ would see.
 
 import hmac
 import secrets
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from http import HTTPStatus
+from importlib.resources import files
 from typing import Any
 from unittest.mock import patch
 
@@ -47,16 +48,15 @@ class Guard:
         self,
         token: str,
         sockets: Mapping[str, Socket] | None = None,
-        scripts: Mapping[str, bytes] | None = None,
-        page: Callable[[bytes], bytes] = lambda page: page,
+        added: Sequence[str] = (),
     ):
         """
         Args:
             sockets: functions for websockets of our own, by their paths.
-            scripts: contents of scripts of our own, by their paths.
-            page: changes the page that viser serves.
+            added: files of `static`, scripts and style sheets, that are added to viser's page.
         """
-        self._token, self._sockets, self._scripts, self._page = token.encode(), sockets or {}, scripts or {}, page
+        self._token, self._sockets = token.encode(), sockets or {}
+        self._added = {f"/{name}": files("scengen.studio").joinpath("static", name).read_bytes() for name in added}
 
     def serve(self, handler: Socket, host: str, port: int, **options: Any) -> Any:
         """`websockets.serve` with the guard before viser's functions."""
@@ -68,14 +68,14 @@ class Guard:
             if request.headers.get("Upgrade", "").lower() == "websocket":
                 return None
             path = request.path.partition("?")[0]
-            if path in self._scripts:
-                return _answer(HTTPStatus.OK, self._scripts[path], {"Content-Type": "application/javascript"} | HEADERS)
+            if path in self._added:
+                return _answer(HTTPStatus.OK, self._added[path], {"Content-Type": _kind(path)} | HEADERS)
             is_page = path == "/"
             if is_page:  # it is changed below, which is simpler before it is packed
                 request.headers.pop("Accept-Encoding", None)
             response = answer(connection, request)
             if is_page:
-                response.body = self._page(response.body)
+                response.body = _with(response.body, self._added)
                 del response.headers["Content-Length"]
                 response.headers["Content-Length"] = str(len(response.body))
             response.headers["Content-Security-Policy"] = POLICY.format(host=request.headers.get("Host", ""))
@@ -104,6 +104,23 @@ class Guard:
 
 
 _serve = websockets.asyncio.server.serve
+
+
+def _kind(path: str) -> str:
+    """Type of a file that is added to the page."""
+    return "text/css" if path.endswith(".css") else "application/javascript"
+
+
+def _with(page: bytes, added: Iterable[str]) -> bytes:
+    """viser's page with scripts and style sheets of ours, after its own."""
+    tags = (
+        f'<link rel="stylesheet" href="{path[1:]}">'
+        if path.endswith(".css")
+        else f'<script src="{path[1:]}" defer></script>'
+        for path in added
+    )
+    head, end, body = page.rpartition(b"</head>")
+    return head + "".join(tags).encode() + end + body
 
 
 def _answer(status: HTTPStatus, body: bytes = b"", headers: Mapping[str, str] | None = None) -> Response:

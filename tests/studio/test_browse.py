@@ -56,6 +56,9 @@ def test_browse_play_scrub_find_and_see_the_twin(chromium, opened, shifted, tmp_
         browser = studio._pages[client.client_id].browser
         browser._find.value = last.id
         page.get_by_text(str(last)).first.wait_for()
+        browser._find.value = "nothing-like-it"
+        page.get_by_role("alert").get_by_text("nothing-like-it").wait_for()
+        assert str(last) in tab.text() and "jittered runs succeed" in tab.text(), "the page stays"
         browser._pool.value = browser._pool.options[1]
         page.get_by_text("moved out of training").wait_for()
         assert "tile" in tab.text() or "gap" in tab.text()
