@@ -77,7 +77,7 @@ TRAINING_VIEW = VIEWS[1]  # orientation that a policy learns here: the paper's
 class MirrorPickPlace(Scenario):
     """One cube on the table, and pictures that are not upright."""
 
-    VERSION = 3
+    VERSION = 4
     HOLD = 0.3
     NO_ABLATIONS = "the cube is lifted with the hand alone, and what is turned is the picture, which no scene holds"
 
