@@ -64,7 +64,7 @@ ALL ?=
 readme: setup
 	$(BIN)/python tests/readme/run.py $(ALL)
 
-# Runs FUZZ mangled command lines, from SEED. Each must exit with 0, 1 or 2 and print one line with a remedy.
+# Runs FUZZ mangled command lines, from SEED. Each must exit with status 0 to 3, and with 2 it must print one line with a remedy.
 FUZZ ?= 2000
 SEED ?= 0
 fuzz: setup

@@ -19,6 +19,7 @@ from typing import Any
 
 import yaml
 from hydra import compose, initialize_config_dir
+from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override, ValueType
@@ -31,6 +32,7 @@ from .samplers.task import Task, load
 from .samplers.task_files import (
     ORIGINS,
     SEARCH_PATH,
+    SELF,
     category,
     command_file,
     conf_dir,
@@ -135,10 +137,15 @@ def composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[
             for text in prepared:
                 _check_override(verb, text)
             prepared = _with_packages(prepared) if groups(verb) else prepared
-            node = compose(config_name(verb), overrides=prepared, return_hydra_config=True)
+            node = compose(config_name(verb, prepared), overrides=prepared, return_hydra_config=True)
             choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
             OmegaConf.set_struct(node, False)
             del node["hydra"]
+            if EXPERIMENT in node and EXPERIMENT in choices:
+                raise BadConfig(f"{EXPERIMENT}/{choices[EXPERIMENT]}.yaml: start it with `# @package _global_`")
+            if EXPERIMENT in node:
+                told = f"no folder of the search path has {EXPERIMENT}/{cut(str(node[EXPERIMENT]))}.yaml"
+                raise BadConfig(f"{told}; give hydra.searchpath=FOLDER, the folder in which {EXPERIMENT}/ is")
             return OmegaConf.to_container(node, resolve=True), choices  # type: ignore[return-value]
         except (HydraException, OmegaConfBaseException) as error:
             raise _explained(verb, overrides, error) from None
@@ -176,10 +183,23 @@ def config_dir(verb: str) -> Path:
     return conf_dir() if groups(verb) else conf_dir() / "command"
 
 
-def config_name(verb: str) -> str:
-    """Name of the file of a command in its `config_dir`."""
+EXPERIMENT = "experiment"
+"""Group of files with settings of people, in folders of the search path: `+experiment=heavy`."""
+
+
+def config_name(verb: str, overrides: Sequence[str] = ()) -> str:
+    """Name of the file of a command in its `config_dir`.
+
+    Hydra looks for groups that overrides add (`+experiment=heavy`) in the folder of the file that it starts from, which
+    must not be command/ then: a file of the same name in the folder above stands for it.
+    """
     file = command_file(verb).stem
-    return f"command/{file}" if groups(verb) else file
+    if not groups(verb):
+        return file
+    if any(re.match(r"\+\w+=", text) for text in overrides):
+        ConfigStore.instance().store(name=file, node={"defaults": [f"/command/{file}", SELF]})
+        return file
+    return f"command/{file}"
 
 
 def as_yaml(verb: str, overrides: Sequence[str]) -> str:
@@ -208,7 +228,7 @@ def hydra_yaml(verb: str, overrides: Sequence[str]) -> str:
     with initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
         prepared = _all_prepared(overrides)
         prepared = _with_packages(prepared) if groups(verb) else prepared
-        node = compose(config_name(verb), overrides=prepared, return_hydra_config=True)
+        node = compose(config_name(verb, prepared), overrides=prepared, return_hydra_config=True)
         OmegaConf.set_struct(node, False)
         return OmegaConf.to_yaml(OmegaConf.create({"hydra": OmegaConf.to_container(node.hydra, resolve=False)}))
 
@@ -229,7 +249,7 @@ def print_origin(verb: str, overrides: Sequence[str], topic: str) -> None:
     with _logging_restored(), initialize_config_dir(str(config_dir(verb)), version_base="1.3", job_name="scengen"):
         prepared = _all_prepared(overrides)
         prepared = _with_packages(prepared) if groups(verb) else prepared
-        GlobalHydra.instance().hydra.show_info(topic, config_name(verb), prepared)  # type: ignore[union-attr]
+        GlobalHydra.instance().hydra.show_info(topic, config_name(verb, prepared), prepared)  # type: ignore[union-attr]
 
 
 @contextmanager
@@ -246,6 +266,10 @@ def _logging_restored() -> Iterator[None]:
 
 # --- overrides --------------------------------------------------------------------------------
 
+JOINED = ("split", "perturb")
+"""Settings whose parts are joined by `+`."""
+LISTED = 5
+"""Largest number of values that a message repeats."""
 MAX_DIGITS = 4300
 """Number of digits of the longest number that Python reads."""
 MAX_DEPTH = 20
@@ -346,7 +370,14 @@ def _check_override(verb: str, text: str) -> None:
     if override.package is not None:
         raise BadConfig(f"{quoted}: a setting has no package after @; see scengen {verb} --help")
     if override.is_sweep_override():
-        raise BadConfig(f"{quoted} has multiple values; give one, or quote a value with commas twice: \"{key}='...'\"")
+        raise BadConfig(f"{quoted} has multiple values; {_one_by_one(verb, override)}")
+    if (
+        key in JOINED
+        and key in _known(verb)
+        and isinstance(value := override.value(), list)
+        and key not in _lists(verb)
+    ):
+        raise BadConfig(f"{quoted}: parts are joined by +; give {key}={'+'.join(map(str, value))}")
     if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
         raise BadConfig(f"{quoted}: {_instead_of(key)}; hydra.searchpath is the only setting of Hydra for scengen")
     if override.is_delete() and (name := re.split("[./]", key)[0]) not in (known := _known(verb)):
@@ -369,6 +400,26 @@ def _check_override(verb: str, text: str) -> None:
         raise BadConfig(f"{quoted}: expected the name of a file of conf/{key} without .yaml; {_files_of(key)}")
     if key in groups(verb) and override.value() is None:
         raise BadConfig(f"{quoted}: leave it out, or name a file of conf/{key}")
+
+
+def _one_by_one(verb: str, override: Override) -> str:
+    """What to give instead of several values of a setting, to a command that takes one."""
+    key = override.get_key_element()
+    if override.value_type is ValueType.SIMPLE_CHOICE_SWEEP and verb == "new":
+        return "give one"
+    try:
+        values = list(itertools.islice(override.sweep_string_iterator(), MAX_COMBINATIONS))
+    except HydraException:
+        values = ["VALUE"]
+    shown = [*map(shlex.quote, values[:LISTED]), *(["..."] if len(values) > LISTED else [])]
+    target = next((f" {name}=NAME-$x" for name in ("to", "json") if name in _known(verb)), "")
+    loop = f"for x in {' '.join(shown)}; do scengen {verb} ... {key}=$x{target}; done"
+    return f"{verb} takes one at a time (generate and demos take several): {loop}"
+
+
+def _lists(verb: str) -> list[str]:
+    """Names of the settings of a command that may be lists, by the default or the example in its file."""
+    return re.findall(r"^(\w+):.*[\[]", command_file(verb).read_text(), re.M)
 
 
 def _instead_of(key: str) -> str:
@@ -535,6 +586,8 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
             return BadConfig(f"{path}: {whole} has no settings in it; give {whole}=... alone")
         if not seen and part in groups(verb) and part not in node.keys():  # noqa: SIM118
             return BadConfig(f"{path}: no {part} is chosen; give {part}=NAME, too")
+        if not seen and part == EXPERIMENT:
+            return BadConfig(f"{part} is a group of your own files; give +{part}=NAME, with a plus")
         if part not in node.keys():  # noqa: SIM118  (`in` leaves out what has no value yet)
             known = {*map(str, node), *([] if seen else groups(verb))}
             if seen == ["executor"] and not known:

@@ -52,6 +52,10 @@ class PoolError(ScengenError):
     """A pool is missing, damaged or locked, or does not belong to the run that wants to write it."""
 
 
+class OtherVersions(PoolError):
+    """A pool was certified with a MuJoCo or robosuite that is not installed, so that nothing can be judged here."""
+
+
 class Unstable(ScengenError):
     """MuJoCo raised a warning, so that nothing simulated after it is valid."""
 
@@ -85,6 +89,18 @@ SHOWN_LENGTH = 200
 def cut(text: str, most: int = SHOWN_LENGTH) -> str:
     """The first `most` characters of a text, with `...` if it is longer."""
     return text if len(text) <= most else f"{text[:most]}..."
+
+
+def contrasted(one: str, other: str, most: int = 60) -> tuple[str, str]:
+    """Two texts that differ, cut where they agree: at most `most` characters of each, with their first difference."""
+    pairs, shorter = enumerate(zip(one, other, strict=False)), min(len(one), len(other))
+    first = next((place for place, (a, b) in pairs if a != b), shorter)
+    begin = max(0, first - most // 3) if max(len(one), len(other)) > most else 0
+
+    def shown(text: str) -> str:
+        return f"{'...' if begin else ''}{cut(text[begin:], most)}"
+
+    return shown(one), shown(other)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

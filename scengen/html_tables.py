@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from itertools import islice
-from typing import Any
 
 from .errors import cut
 
@@ -36,11 +35,6 @@ def spoken(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
     return ", ".join(f"{k} = {spoken(v)}" for k, v in value.items()) if isinstance(value, Mapping) else str(value)
-
-
-def plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The entries of a mapping that are numbers or texts."""
-    return {name: value for name, value in values.items() if isinstance(value, (int, float, str)) and value != ""}
 
 
 def _cells(tag: str, values: Sequence[object]) -> str:

@@ -4,14 +4,14 @@ import abc
 import copy
 import hashlib
 from collections.abc import Callable, Generator, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import ClassVar, Self
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .assets.prop import TABLE_HALF
+from .assets.prop import TABLE_HALF, Prop
 from .decisions import Decision
 from .errors import NoOracle
 from .means import Mean
@@ -286,8 +286,9 @@ class Scenario(abc.ABC):
 
     @property
     def material(self) -> str:
-        """Hashes of ingredients other than parameters, such as scans; empty if the parameters decide everything."""
-        return ""
+        """Hashes of ingredients other than parameters, such as the meshes of its assets; empty if the parameters decide
+        everything."""
+        return "".join(_materials(self))
 
     @property
     def id(self) -> str:
@@ -296,3 +297,14 @@ class Scenario(abc.ABC):
         posed = f" {self.conditions}" if self.conditions else ""
         text = f"{type(self).__module__}.{type(self).__qualname__} {canonical(self)}{self.material}{posed}"
         return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _materials(owner: object) -> Iterator[str]:
+    """`Prop.material` of all assets that a dataclass holds, in the order of its fields."""
+    for field in fields(owner):  # type: ignore[arg-type]
+        value = getattr(owner, field.name)
+        for each in value if isinstance(value, tuple) else (value,):
+            if isinstance(each, Prop):
+                yield each.material
+            if is_dataclass(each):
+                yield from _materials(each)

@@ -120,14 +120,26 @@ def test_texts_of_strangers_are_escaped(draw, tmp_path):
         assert is_harmless(page) and "&lt;img" in page, page
 
 
-def test_a_certificate_tells_passed_failed_and_not_checked():
-    results = {"feasible": True, "solved": False, "witness": None}
-    checks = tuple(Check(name, passed, "why", {}, {"depth": 0.00012345}) for name, passed in results.items())
+def test_a_certificate_tells_passed_failed_and_skipped_in_words():
+    results = {"overlap": True, "solved": False, "witness": None}
+    checks = tuple(
+        Check(name, passed, "" if passed else "why", {}, {"deepest": 0.00012345}) for name, passed in results.items()
+    )
     page = Certified(Certificate("quick", checks), "", ACTIONS, "")._repr_html_()
-    told = re.findall(r">(\w+)</td><td[^>]*>(passed|failed|not checked)<", page)
-    assert told == [("feasible", "passed"), ("solved", "failed"), ("witness", "not checked")]
-    assert "unknown, witness" in page
-    assert "depth = 0.0001234" in page and "of 3 actions" in page
+    told = re.findall(r">(\w+)</td><td[^>]*>(yes|NO|skipped)</td><td[^>]*>([^<]*)<", page)
+    assert told == [
+        ("overlap", "yes", "deepest contact 0.123 mm"),
+        ("solved", "NO", "why"),
+        ("witness", "skipped", "why"),
+    ]
+    assert "unknown, witness of 3 actions" in page
+
+
+def test_the_jittered_runs_of_a_certificate_are_counted():
+    numbers = {"solved": 4, "runs": 4, "bound": 0.472870804501588, "failures": []}
+    checks = (Check("robust", True, "", {}, numbers),)
+    page = Certified(Certificate("quick", checks), "", ACTIONS, "")._repr_html_()
+    assert "4 of 4 jittered runs succeed: at least 47% of all, with 95 % confidence" in page and "0.4728" not in page
 
 
 def test_a_pool_shows_its_scenarios():

@@ -34,6 +34,13 @@ def test_every_link_of_the_repository_leads_somewhere(path):
     assert not wrong
 
 
+def test_each_word_of_the_glossary_is_linked_where_it_is_used():
+    words, others = slugs(ROOT / "docs" / "glossary.md") - {"glossary"}, [p for p in PAGES if p.name != "glossary.md"]
+    linked = {found for path in others for found in re.findall(r"glossary\.md#([\w-]+)", path.read_text())}
+    assert words == linked
+    assert len((ROOT / "docs" / "glossary.md").read_text().split()) <= 350
+
+
 def test_people_keep_what_they_can_read():
     assert sum(len(path.read_text().split()) for path in (ROOT / "docs").rglob("*.md")) <= MOST_WORDS
 

@@ -48,6 +48,12 @@ class Prop(abc.ABC):
         self.fill(spec.worldbody.add_body(name="body"), spec)
         return spec
 
+    @property
+    def material(self) -> str:
+        """Hash of ingredients other than parameters, such as a mesh, on which ids of scenarios depend; empty if it has
+        none."""
+        return ""
+
     @abc.abstractmethod
     def fill(self, body: mujoco.MjsBody, spec: mujoco.MjSpec) -> None:
         """Add geoms, joints and child bodies to `body`, and meshes to `spec`."""

@@ -225,6 +225,10 @@ class Ycb(Prop):
             raise BadConfig(f"there is no scan of {self.called}; known: {known}; name a folder with its scan in ycb=")
         return self.scans.get(self.called)
 
+    @property
+    def material(self) -> str:
+        return self.scan.sha256 if self.scan else ""
+
     @cached_property
     def row(self) -> Item:
         """Entry of the object in `ITEMS`."""

@@ -1,6 +1,7 @@
 """The command line: a verb, then Hydra overrides. `scengen generate task=domino_single split=diagonal n=100`."""
 
 import ast
+import io
 import os
 import re
 import signal
@@ -15,15 +16,17 @@ from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn, TextIO
 
-from ..errors import BadConfig, ForeignCode, ScengenError, cut, nearest, place_of
+from ..errors import BadConfig, ForeignCode, OtherVersions, ScengenError, cut, nearest, place_of
 from .verbs import COMMANDS, CONTINUING, FORMS, GROUPS, ONLY_FORMS, RENAMED, VERBS, file_stem, parsed
 
 OK = 0
 """Exit status of a command that succeeded."""
 BAD_INPUT = 2
 """Exit status after wrong input or a fault of the machine."""
+DECLINED = 3
+"""Exit status if something cannot be judged with what is installed here."""
 INTERRUPTED = 130
 """Exit status after Ctrl-C."""
 COMPLETING = ("--completion", "--complete")
@@ -44,8 +47,7 @@ def main() -> NoReturn:
     """Run one verb and leave with its exit status."""
     signals = Signals()
     warnings.showwarning = print_warning
-    for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]  # a name need not be Unicode
+    sys.stdout, sys.stderr = _lasting(sys.stdout), _lasting(sys.stderr)
     status = run(sys.argv[1:], signals)
     if status == INTERRUPTED:
         with suppress(OSError):
@@ -53,6 +55,32 @@ def main() -> NoReturn:
         signals.end()  # at once: Python takes seconds to take itself apart on a busy machine
     signals.finish(status)
     sys.exit(status)
+
+
+class LastingFile(io.FileIO):
+    """A file that discards what a pipe refuses because its reader has gone, as `| head` does.
+
+    The command goes on and ends with its own status.
+    """
+
+    def write(self, data: Any) -> int:
+        """Write some bytes, or discard them."""
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self.fileno())
+            os.close(nowhere)
+            return super().write(data)
+
+
+def _lasting(stream: TextIO | None) -> TextIO:
+    """A standard stream that outlives its reader and can print names that are not Unicode; nowhere if it is closed."""
+    if stream is None:
+        return open(os.devnull, "w")
+    lines = bool(stream.line_buffering or stream.write_through)  # type: ignore[attr-defined]  # PYTHONUNBUFFERED sets the latter
+    file = io.BufferedWriter(LastingFile(stream.fileno(), "w", closefd=False))
+    return io.TextIOWrapper(file, stream.encoding, "backslashreplace", line_buffering=lines)
 
 
 class Signals:
@@ -122,7 +150,7 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
     """Run one command.
 
     Returns:
-        Exit status: 0 success, 1 a check failed, 2 bad input or a fault of the machine, 130 interrupted.
+        Exit status: 0 success, 1 a check failed, 2 bad input or a fault of the machine, 3 no verdict, 130 interrupted.
     """
     try:
         return _run(argv, signals)
@@ -147,10 +175,8 @@ def _status_of(error: Exception) -> int:
     if isinstance(error, ForeignCode):
         return _failed(str(error), _write_traceback(error))
     if isinstance(error, ScengenError):
-        return _failed(f"{place}: {error}" if place else str(error))
-    if isinstance(error, BrokenPipeError):
-        sys.stderr.close()
-        return OK
+        status = _failed(f"{place}: {error}" if place else str(error))
+        return DECLINED if isinstance(error, OtherVersions) else status
     if isinstance(error, MemoryError) or NO_MEMORY in str(error):
         return _failed(OUT_OF_MEMORY, _write_traceback(error))
     if isinstance(error, OSError):
@@ -205,8 +231,7 @@ def _run(argv: Sequence[str], signals: Signals | None) -> int:
     if verb == "--complete":
         out.print("\n".join(completions(" ".join(arguments), VERBS)), soft_wrap=True)
         return OK
-    if verb in ("generate", "demos"):  # multiple values are a sweep there, with or without Hydra's option
-        arguments = [a for a in arguments if a not in ("-m", "--multirun")]
+    arguments = [a for a in arguments if a not in ("-m", "--multirun")]  # multiple values say it by themselves
     flags = [a for a in arguments if a.startswith("-")]
     if flags and flags[0].partition("=")[0] in SHOW_OPTIONS:
         return _show(verb, arguments)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..certificate import as_json
 from ..episode import STRICT, check_rules
-from ..errors import Infeasible, PoolError, ScengenError
+from ..errors import Infeasible, PoolError, ScengenError, contrasted
 from ..params import canonical
 from ..pool import Pool
 from ..pool.demonstrations import (
@@ -118,7 +118,8 @@ class Judge:
         """Faults that are seen without a simulation."""
         for name, there in self._labels.items():
             if getattr(row, name) != there:
-                yield f"the {name} is {ascii(getattr(row, name))[:60]}, the manifest says {ascii(there)[:60]}"
+                told, said = contrasted(ascii(getattr(row, name)), ascii(there))
+                yield f"the {name} is {told}, the manifest says {said}"
         if row.task != self.task.name:
             return
         scenario = self.task.scenario(row.params, row.split)
@@ -168,7 +169,8 @@ class Judge:
         if again.outcome != row.outcome:
             faults.append(f"replayed, the outcome is {again.outcome} ({again.reason}), not {row.outcome}")
         if self.same_machine and again.outcome == row.outcome and again.reason != row.reason:
-            faults.append(f"the reason is {row.reason[:200]!a}, replayed it is {again.reason[:200]!a}")
+            told, found = contrasted(ascii(row.reason), ascii(again.reason), 200)
+            faults.append(f"the reason is {told}, replayed it is {found}")
         if self.same_machine and not exact:
             faults.append("the replay ends in other bits")
         if self.same_machine and again.seconds != row.seconds:

@@ -81,7 +81,7 @@ def bodies_of(task: Task, scenes: Iterable[str] = ()) -> Bodies:
         scenes: further scenes (MJCF), such as those of a pool that was drawn with other distributions.
     """
     found: dict[str, bool] = {}
-    for bodies in chain([_bodies_drawn(task)], map(_bodies_in_text, _distinct(scenes))):
+    for bodies in chain([_bodies_drawn(task)], map(bodies_in_text, _distinct(scenes))):
         for name, moves in bodies.items():
             found[name] = found.get(name, False) or moves
     return {name: found[name] for name in sorted(found, key=_natural_key) if name not in COMMON_BODIES}
@@ -272,7 +272,8 @@ def _distinct(scenes: Iterable[str]) -> Iterator[str]:
             yield text
 
 
-def _bodies_in_text(text: str) -> Bodies:
+def bodies_in_text(text: str) -> Bodies:
+    """The bodies of a scene (MJCF)."""
     scene_text.check(text)
     found = {}
     for body in ET.fromstring(text).iter("body"):

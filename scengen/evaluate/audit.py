@@ -16,7 +16,7 @@ from ..look.looks import look_named
 from ..pool import Pool, kinds
 from ..pool.demonstrations import Demonstrations, is_demonstrations
 from ..pool.manifest import MANIFEST
-from ..validate.verify.spot import excluded_share
+from ..validate.verify.spot import bound
 from ..work.log import different
 from ..work.parallel import UNTRUSTED_LIMITS, each
 from ..work.plain import MAX_JOURNAL, read_plain
@@ -329,9 +329,8 @@ class _Audit:
         """State what was not checked."""
         report, count = self.report, len(self.lines)
         if self.sampled < count:
-            share = 100 * excluded_share(count, self.sampled)
-            bound = f"a share of {share:.3g} % or more of lines that cannot be rebuilt is excluded at 95 %"
-            report.remarks.append(f"{self.sampled} of {count} lines rebuilt, seed {self.options.seed}: {bound}")
+            shown = f": {bound(count, self.sampled, 'lines')}" if report.verdict == "sound" else ""
+            report.remarks.append(f"{self.sampled} of {count} lines rebuilt, seed {self.options.seed}{shown}")
         if count > len(self.wanted):
             report.remarks.append(f"{count - len(self.wanted)} lines are of a longer run, and not in the table")
         report.remarks += self._other_machines()

@@ -7,7 +7,7 @@ from typing import Any
 from ..compose import load_task
 from ..envs.gym import PoolEnv
 from ..episode import Actions, check_rules
-from ..errors import ScengenError
+from ..errors import ScengenError, contrasted
 from ..pool.files import sha256
 from ..samplers.task import Task
 from ..validate.playable import stored_world
@@ -117,7 +117,8 @@ def _wrong_end(
     here = line["machine"] == fingerprint()
     for name, value in {**found, **exact}.items() if here else {"success": again.solved}.items():
         if value != line[name]:
-            yield f"says {name} = {str(line[name])[:80]!a}; its kept actions give {str(value)[:80]!a}"
+            told, found = contrasted(ascii(str(line[name])), ascii(str(value)))
+            yield f"says {name} = {told}; its kept actions give {found}"
 
 
 def lost(item: Item, reason: str) -> Rebuilt:

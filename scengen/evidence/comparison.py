@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from ..errors import Infeasible
+from ..errors import Infeasible, contrasted
 from ..installation import versions
 from ..samplers.split import ID
 from ..samplers.task import Task
@@ -51,12 +51,8 @@ class Difference:
     level: Level
 
     def __str__(self) -> str:
-        return f"{self.task}: {self.kind}: {self.what}: {_short(self.stored)} is now {_short(self.now)}"
-
-
-def _short(value: Any) -> str:
-    text = "nothing" if value is NOTHING else str(value)
-    return text if len(text) <= 80 else f"{text[:77]}..."
+        was, now = contrasted(*("nothing" if value is NOTHING else str(value) for value in (self.stored, self.now)), 80)
+        return f"{self.task}: {self.kind}: {self.what}: {was} is now {now}"
 
 
 @dataclass(frozen=True)

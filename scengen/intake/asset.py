@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 import mujoco
 import numpy as np
 
-from ..assets.mesh_prop import MeshProp, Points
+from ..assets.mesh_prop import FILE, MeshProp, Points
 from ..assets.prop import TABLE_TOP, Prop, place, table
 from ..assets.turned import FOOT_RADIUS
 from ..errors import BadConfig, UnknownName, cut
@@ -168,6 +168,11 @@ class MeshAsset:
         """MJCF of a model with one body, "body", without references to files."""
         return emit(self.prop.spec())[0]
 
+    @cached_property
+    def files(self) -> dict[str, str]:
+        """Files that represent the asset: MJCF, and the body as data for `MeshProp.load`."""
+        return {"asset.xml": self.xml, FILE: json.dumps(self.prop.written()) + "\n"}
+
     def figures(self) -> dict[str, Any]:
         """Figures of the asset, as plain data."""
         extents = self.solid.mesh.extents
@@ -201,7 +206,7 @@ class MeshAsset:
                 "side_below": side,
                 "lean": lean,
             },
-            "sha256": {"asset.xml": hashlib.sha256(self.xml.encode()).hexdigest()},
+            "sha256": {name: hashlib.sha256(text.encode()).hexdigest() for name, text in self.files.items()},
         }
 
 
@@ -240,6 +245,7 @@ def _make_asset(request: IntakeRequest) -> MeshAsset:
         vertices, faces, palette, chosen = painted(*visual, colours, request.seed)
         origin = visual[0][0] - prop.vertices[0]
         prop = replace(prop, vertices=vertices - origin, faces=faces, palette=palette, painted=chosen)
+    prop = MeshProp.read(prop.written())  # what a task loads is what is dropped
     asset = MeshAsset(request, found, pieces, hull, visual, prop)
     asset.figures()  # the drop and the MJCF are kept in the asset
     return asset
@@ -271,6 +277,7 @@ def _prop(
         vertices=vertices @ turn.T - origin,
         faces=faces,
         mass=float(mesh.mass),
+        weighed=float(mesh.mass),
         com=com - origin,
         inertia=turn @ np.asarray(mesh.moment_inertia) @ turn.T,
         friction=request.friction,
@@ -302,8 +309,8 @@ def stored_figures(request: IntakeRequest, folder: Path) -> dict[str, Any] | Non
     wanted = key(request, hashlib.sha256(content(request.mesh)).hexdigest())
     try:
         figures = json.loads(read_plain(folder / "asset.json"))
-        sha256 = hashlib.sha256(read_plain(folder / "asset.xml")).hexdigest()
-        same = figures["key"] == wanted and figures["sha256"]["asset.xml"] == sha256
+        sha256 = {name: hashlib.sha256(read_plain(folder / name)).hexdigest() for name in ("asset.xml", FILE)}
+        same = figures["key"] == wanted and figures["sha256"] == sha256
     except (OSError, ValueError, KeyError, TypeError, RecursionError):  # there is no asset, or the files are not ours
         return None
     return figures if same else None

@@ -130,7 +130,7 @@ class Measurement:
         """Run a command of scengen.
 
         Returns:
-            Exit status: 0 success, 1 a check failed, 2 bad input or no verdict.
+            Exit status: 0 success, 1 a check failed, 2 bad input, 3 no verdict.
         """
         assert self.command
         return self.command((*words, *self.search))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import Loop
-from ..envs.object_state import ObjectState
+from ..envs.object_state import ObjectState, bodies_in_text
 from ..envs.observations import Stream, cameras_of, privileged, streams_of
 from ..episode import Actions, Episode
 from ..look.looks import ROOM
@@ -129,7 +129,7 @@ class Stage:
             secrets: names that no text may have.
         """
         self.scenario, self.embodiment, self.witness = scenario, embodiment, witness
-        self.words, self.secrets = words, secrets
+        self.words, self.secrets, self.bodies = words, secrets, bodies_in_text(scene_xml)
         self.world = World.load(scene_xml, embodiment, with_spares(ROOM))
         self.cameras = cameras_of(embodiment)
         self.streams: dict[str, Stream] = streams_of(embodiment)
@@ -145,9 +145,7 @@ class Stage:
 
     def proof(self, kind: Kind, level: int) -> Proof:
         """Try a kind at a level."""
-        drawn = Perturbation(((kind.name, level),)).of(
-            self.scenario.id, bodies=self.world.free_bodies, words=self.words
-        )
+        drawn = Perturbation(((kind.name, level),)).of(self.scenario.id, bodies=self.bodies, words=self.words)
         with changed_by(drawn, self.eye) as changed:
             neutral = all(name.startswith(SEEN) or self._is_spare(name, rows) for name, rows in changed.items())
             if kind.effect.reads == LANGUAGE:
@@ -277,5 +275,5 @@ class Stage:
         return changes
 
     def _all_streams(self) -> Mapping[str, Stream]:
-        state = ObjectState(dict.fromkeys(self.world.free_bodies, True), len(self.world.arms))
+        state = ObjectState(self.bodies, len(self.world.arms))
         return {**self.streams, **privileged(state, type(self.scenario), Orientation)}

@@ -12,11 +12,12 @@ import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache, cached_property, partial
+from importlib import import_module
 from typing import Any
 
 import mujoco
 import numpy as np
-from mujoco import MjModel
+from mujoco import MjModel, gl_context
 
 from ..errors import BadConfig, ScengenError, cut
 
@@ -67,6 +68,28 @@ def _end_at_once(hook: Any, *error: Any) -> None:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_leave_to_the_parent)
+
+
+def has_display() -> bool:
+    """Whether MuJoCo's contexts need no display, or have one: only those of GLFW need one, and only on Linux.
+
+    MuJoCo reads `MUJOCO_GL` when it is imported, possibly before scengen has set it or the user has. Without a display
+    its contexts are then exchanged for those that the variable names now.
+    """
+    if "glfw" not in gl_context.GLContext.__module__ or sys.platform != "linux" or os.environ.get("DISPLAY"):
+        return True
+    backend = os.environ.get("MUJOCO_GL", "").lower().strip()
+    if backend not in WITHOUT_DISPLAY:
+        return False
+    try:
+        gl_context.GLContext = import_module(f"mujoco.{backend}").GLContext
+    except Exception:  # the type of the error for a missing library depends on the back end
+        return False
+    return True
+
+
+WITHOUT_DISPLAY = ("egl", "osmesa")
+"""Values of `MUJOCO_GL` that need no display, and modules of MuJoCo."""
 
 
 def check_size(**edges: int) -> None:

@@ -2,8 +2,6 @@
 
 import base64
 import io
-import os
-import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -11,7 +9,7 @@ from typing import NoReturn
 
 import mujoco
 import numpy as np
-from mujoco import MjvCamera, gl_context
+from mujoco import MjvCamera
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -140,10 +138,10 @@ def check_pictures() -> None:
     """Raise `NoPictures` if OpenGL would end the process: without a display, or with too little address space; `Forked`
     if it would not answer."""
     opengl.check_process()
-    if "glfw" in gl_context.GLContext.__module__ and sys.platform == "linux" and not os.environ.get("DISPLAY"):
+    if not opengl.has_display():
         raise NoPictures(
             "no OpenGL for pictures without a display; on Debian install libegl1 libgl1 libosmesa6, and set "
-            "MUJOCO_GL=egl or import scengen before mujoco"
+            "MUJOCO_GL=egl or osmesa"
         )
     if (free := free_address_space()) < MIN_ADDRESS_SPACE:  # OpenGL would end the process without a message
         raise NoPictures(

@@ -289,10 +289,6 @@ class PickPlaceYcb(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
-    def material(self) -> str:
-        return self.thing.scan.sha256 if self.thing.scan else ""
-
     @functools.cached_property
     def start(self) -> Vec3:
         """Initial position of the object's foot [m]."""

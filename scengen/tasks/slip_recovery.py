@@ -364,10 +364,6 @@ class SlipRecovery(Scenario):
 
     # --- geometry -------------------------------------------------------------------------
 
-    @property
-    def material(self) -> str:
-        return self.thing.scan.sha256 if self.thing.scan else ""
-
     @cached_property
     def start(self) -> Vec3:
         """Initial position of the object's foot [m]."""

@@ -12,7 +12,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from ..errors import PoolError
+from ..errors import OtherVersions
 from ..installation import versions
 from ..scenario import Scenario
 
@@ -21,11 +21,11 @@ def check_versions(made: Mapping[str, str], where: str) -> None:
     """Refuse a pool that was certified with a MuJoCo or robosuite that differs from the installed one.
 
     Raises:
-        PoolError: one of them differs.
+        OtherVersions: one of them differs.
     """
     for package in ("mujoco", "robosuite"):
         if made[package] != versions()[package]:
-            raise PoolError(
+            raise OtherVersions(
                 f"{where} was certified with {package} {made[package]}, this is {versions()[package]}; install that "
                 "version, or run scengen verify and certify the pool again"
             )

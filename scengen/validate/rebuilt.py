@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..errors import BadConfig, cut
+from ..errors import BadConfig, contrasted, cut
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.embodiment import JAW
@@ -120,7 +120,8 @@ def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> s
             if mine != theirs and (
                 exact or name in WHOLE or mine is None or theirs is None or not _close(mine, theirs)
             ):
-                return f"{NOT_REBUILT}: {name} of {where} is {str(mine)[:60]!a} instead of {str(theirs)[:60]!a}"
+                told, made = contrasted(ascii(str(mine)), ascii(str(theirs)))
+                return f"{NOT_REBUILT}: {name} of {where} is {told} instead of {made}"
     if len(here) != len(there):
         return f"{NOT_REBUILT}: it has {len(here)} elements instead of {len(there)}"
     if exact:

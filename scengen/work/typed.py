@@ -67,7 +67,8 @@ def _value(where: str, kind: Any, value: Any, exact: bool) -> Any:
         if _fits(option, value):
             return _converted(where, option, value, exact)
     wanted = " or ".join(_spelled(option) for option in options if option is not type(None))
-    raise BadConfig(f"{cut(where)} = {cut(repr(value))}; it must be {wanted}")
+    alone = "; give one of them, and repeat the command for the others" if isinstance(value, list) and value else ""
+    raise BadConfig(f"{cut(where)} = {cut(repr(value))}; it must be {wanted}{alone}")
 
 
 def _fits(option: Any, value: Any) -> bool:

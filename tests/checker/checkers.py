@@ -1,7 +1,7 @@
 """What the corpus is put to: scengen's own verification, and controls that must do badly.
 
-A checker is given the folder of a pool and a level, and returns an exit status: 0 sound, 1 refuted, 2 declined. It says
-why on standard output.
+A checker is given the folder of a pool and a level, and returns an exit status: 0 sound, 1 refuted, 2 not a pool,
+3 declined. It says why on standard output.
 """
 
 import hashlib
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 Checker = Callable[[Path, str, tuple[str, ...]], int]
-SOUND, REFUTED, DECLINED = 0, 1, 2
+SOUND, REFUTED = 0, 1
 
 
 def scengen(folder: Path, level: str, arguments: tuple[str, ...]) -> int:

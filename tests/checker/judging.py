@@ -1,7 +1,7 @@
 """One pool, one checker, one process: what came of it.
 
 A checker runs in a child with an empty working folder, which is ended when it takes too long. Whatever does not end
-with exit status 0, 1 or 2, in time, without a traceback, within its memory, without a file left behind or a process
+with exit status 0 to 3, in time, without a traceback, within its memory, without a file left behind or a process
 left running, is a crash of the checker and counts against it.
 """
 
@@ -29,7 +29,7 @@ BUSY = 4
 """How much longer that may take on a busy machine."""
 MEMORY = 1500
 """How much memory it may use [MB]."""
-VERDICTS = {0: "accept", 1: "reject", 2: "decline"}
+VERDICTS = {0: "accept", 1: "reject", 2: "decline", 3: "decline"}
 MEANT = {"refuse": ("reject", "decline"), "end": ("accept", "reject", "decline")}
 """Verdicts that will do where more than one will."""
 

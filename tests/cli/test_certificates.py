@@ -4,9 +4,10 @@ from dataclasses import replace
 
 from helpers import REFERENCE
 
-from scengen.cli.certificates import certificate_table, found
+from scengen.cli.certificates import certificate_table
 from scengen.cli.tables import in_words
 from scengen.pool import Pool
+from scengen.validate.words import found
 
 
 def check(row, name):

@@ -3,7 +3,7 @@
 import pytest
 import yaml
 
-from scengen import cli
+from scengen import cli, compose
 from scengen.cli.commands.settings import read_task
 from scengen.errors import BadConfig
 from scengen.runs.generate import GenerateSettings
@@ -33,6 +33,67 @@ def test_a_level_of_the_search_path_continues_ours_and_the_command_line_wins(con
 def test_a_name_that_no_verifier_knows_is_refused_before_the_first_draw(conf):
     with pytest.raises(BadConfig, match="verify knows full, quick and prints what differs"):
         read_task("generate", [DOMINO, "certify=called", conf], GenerateSettings)
+
+
+HEAVY = """# @package _global_
+defaults:
+  - override /task: domino_single
+  - override /certify: full
+n: 3
+split: diagonal
+task: {id: {tile: {mass: [uniform, 0.03, 0.04]}}}
+certify: {robust: {runs: 16}}
+"""
+
+
+@pytest.fixture
+def experiments(tmp_path):
+    """A search path with experiments."""
+    (tmp_path / "experiment").mkdir()
+    (tmp_path / "experiment" / "heavy.yaml").write_text(HEAVY)
+    (tmp_path / "experiment" / "bare.yaml").write_text("n: 3\n")
+    (tmp_path / "experiment" / "few.yaml").write_text("# @package _global_\nn: 3\n")
+    return f"hydra.searchpath={tmp_path}"
+
+
+def test_an_experiment_chooses_files_and_sets_values_and_the_command_line_wins(experiments):
+    settings, task, level = read_task("generate", ["+experiment=heavy", experiments], GenerateSettings)
+    assert (settings.n, settings.split, task.name) == (3, "diagonal", "domino_single")
+    assert (level.name, level.robust.runs) == ("full", 16) and task.node["id"]["tile"]["mass"] == [
+        "uniform",
+        0.03,
+        0.04,
+    ]
+    words = ["+experiment=heavy", experiments, "n=7", "certify.robust.runs=9", "certify=quick"]
+    settings, _, level = read_task("generate", words, GenerateSettings)
+    assert (settings.n, level.name, level.robust.runs) == (7, "quick", 9)
+
+
+def test_experiments_are_swept_shown_and_taken_by_commands_without_groups(experiments, capsys):
+    assert cli.run(["generate", "+experiment=heavy", experiments, "--info", "defaults-tree"]) == 0
+    assert "experiment: heavy" in capsys.readouterr().out
+    found = compose.combinations("generate", [DOMINO, "+experiment=few,heavy", experiments])
+    assert [compose.composed("generate", one.overrides)[0]["split"] for one in found] == ["id", "diagonal"]
+    assert compose.composed("record", ["pool=x", "to=y", "+experiment=few", experiments])[0]["n"] == 3
+
+
+@pytest.mark.parametrize(
+    ("word", "told"),
+    [
+        ("+experiment=hevy", "did you mean 'heavy'?"),
+        ("+experiment=bare", "experiment/bare.yaml: start it with `# @package _global_`"),
+        ("experiment=heavy", "give +experiment=NAME, with a plus"),
+    ],
+)
+def test_an_experiment_that_cannot_be_taken_has_a_remedy(word, told, experiments, capsys):
+    assert cli.run(["generate", DOMINO, word, experiments]) == 2
+    shown = capsys.readouterr().err
+    assert told in shown and shown.count("\n") == 1
+
+
+def test_an_experiment_without_a_folder_says_where_to_put_it(capsys):
+    assert cli.run(["generate", DOMINO, "+experiment=heavy"]) == 2
+    assert "give hydra.searchpath=FOLDER, the folder in which experiment/ is" in capsys.readouterr().err
 
 
 def test_options_of_hydra_show_what_they_show_there(capsys):

@@ -100,8 +100,28 @@ def test_a_sweep_makes_a_pool_for_each_combination_and_is_continued(capsys, tmp_
 
 def test_other_commands_say_that_they_take_one_value(capsys):
     status, shown = said(capsys, "axis", "shrink", DOMINO, "index=0,1")
-    assert status == 2 and "has multiple values; give one" in shown.err
-    assert said(capsys, "axis", "shrink", "-m", DOMINO)[1].err.startswith("scengen: '-m' is not an option")
+    assert status == 2 and "axis shrink takes one at a time (generate and demos take several)" in shown.err
+    assert "for x in 0 1; do scengen axis shrink ... index=$x json=NAME-$x; done" in shown.err
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        (
+            ("train", "-m", "data=x", "seed=range(1,20)"),
+            "for x in 1 2 3 4 5 ...; do scengen train ... seed=$x to=NAME-$x",
+        ),
+        (("attack", DOMINO, "seed=1,2"), "do scengen attack ... seed=$x to=NAME-$x; done"),
+        (("evaluate", "policy=a,b", "seeds=3,5"), "for x in 3 5; do scengen evaluate ... seeds=$x to=NAME-$x; done"),
+        (("try", DOMINO, "index=interval(0,1)"), "for x in VALUE; do scengen try ... index=$x; done"),
+        (("train", "data=x", "to=y", "policy=bc,mip"), "give one of them, and repeat the command for the others"),
+        (("generate", DOMINO, "perturb=[a@1,b@1]"), "parts are joined by +; give perturb=a@1+b@1"),
+        (("generate", DOMINO, "split=[diagonal,wide_gaps]"), "parts are joined by +; give split=diagonal+wide_gaps"),
+    ],
+)
+def test_several_values_where_one_is_taken_have_a_remedy(asked, says, capsys):
+    status, shown = said(capsys, *asked)
+    assert status == 2 and says in shown.err and shown.err.count("\n") == 1
 
 
 # --- what a command would work with ----------------------------------------------------------

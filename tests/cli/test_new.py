@@ -40,7 +40,8 @@ def test_the_entry_point_names_the_folder_of_the_task_file(written):
     told = tomllib.loads((written / "pyproject.toml").read_text())["project"]
     (where,) = told["entry-points"]["scengen.tasks"].values()
     assert (written / where.replace(".", "/") / "task" / "slide_home.yaml").is_file()
-    assert told["name"] == "lab-tasks"
+    ours = tomllib.loads((Path(scengen.__file__).parents[1] / "pyproject.toml").read_text())["project"]
+    assert told["name"] == "lab-tasks" and told["requires-python"] == ours["requires-python"]
 
 
 @pytest.mark.parametrize("which", ["not certified", pytest.param("certified", marks=pytest.mark.slow)])

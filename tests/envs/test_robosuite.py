@@ -502,12 +502,14 @@ def test_comparisons_come_in_the_order_of_ids_and_no_more_than_asked_for(monkeyp
     assert counts == [1, 2, 3, 4]
 
 
-@pytest.mark.parametrize(("differing", "status"), [(0, 0), (1, 1)])
-def test_the_command_fails_below_the_limit(differing, status, monkeypatch, tmp_path):
+@pytest.mark.parametrize(
+    ("differing", "end", "status"), [(0, "success", 0), (1, "failure", 1), (1, "unknown", 3), (6, "unknown", 3)]
+)
+def test_the_command_fails_below_the_limit(differing, end, status, monkeypatch, tmp_path):
     def fake(row, search):
         fails = fake.left > 0
         fake.left -= 1
-        return Comparison(row.task, row.id, "success", "failure" if fails else "success", "", 0.0, 0.0)
+        return Comparison(row.task, row.id, "success", end if fails else "success", "", 0.0, 0.0)
 
     fake.left = differing
     monkeypatch.setattr(agreement, "compare", fake)

@@ -55,7 +55,7 @@ def judge(line: list[str], place: Path) -> str:
             return f"escaped: {traceback.format_exc().splitlines()[-1][:300]}"
     told = err.getvalue()
     errors = [x for x in told.split("\n") if x and not re.match(r".*: \d+ of \d+", x)]
-    if status not in (0, 1, 2):
+    if status not in (0, 1, 2, 3):
         return f"status {status}: {told[:300]}"
     if status == 2 and len(errors) != 1:
         return f"{len(errors)} lines of error: {told[:500]}"

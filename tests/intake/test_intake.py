@@ -566,19 +566,21 @@ class TestCommand:
     def test_it_writes_an_asset_and_says_so_the_second_time(self, run, tmp_path):
         status, said = run("mass=0.1")
         assert status == cli.OK and "1 convex piece: " in said and "nothing was computed" not in said
-        files = {p.name: p.read_bytes() for p in (tmp_path / "asset").iterdir()}
-        assert set(files) == {"asset.xml", "asset.json"} | ({"preview.png"} if pictures_are_possible() else set())
+        files = {p.name: p.read_bytes() for p in (tmp_path / "asset").rglob("*.*")}
+        expected = {"prop.json", "asset.xml", "asset.json", "asset.urdf", "look_0.obj", "piece_0.obj"}
+        assert set(files) == expected | ({"preview.png"} if pictures_are_possible() else set())
         status, again = run("mass=0.1")
         assert status == cli.OK and "nothing was computed" in again
         assert again.splitlines()[1:] == said.splitlines()[1:]
-        assert files == {p.name: p.read_bytes() for p in (tmp_path / "asset").iterdir()}
+        assert files == {p.name: p.read_bytes() for p in (tmp_path / "asset").rglob("*.*")}
 
     @pytest.mark.slow
     def test_other_settings_another_file_and_a_damaged_asset_are_computed_anew(self, run, tmp_path):
         run()
         assert "nothing was computed" not in run("density=500")[1]
-        (tmp_path / "asset" / "asset.xml").write_text("<mujoco/>")
-        assert "nothing was computed" not in run("density=500")[1]
+        for name in ("asset.xml", "prop.json"):
+            (tmp_path / "asset" / name).write_text("<mujoco/>")
+            assert "nothing was computed" not in run("density=500")[1]
         changed(scale=0.9).export(tmp_path / "mesh.stl")
         assert "nothing was computed" not in run("density=500")[1]
         (tmp_path / "asset" / "asset.json").write_text("[]")

@@ -13,6 +13,7 @@ from PIL import Image
 from scengen import cli
 from scengen.compose import load_task
 from scengen.envs.gym import PoolEnv
+from scengen.envs.pools import reference_pool
 from scengen.envs.vector import PoolVectorEnv
 from scengen.errors import BadConfig, UnknownName
 from scengen.evaluate.rollouts import evaluate
@@ -172,12 +173,15 @@ def test_episodes_of_an_evaluation_say_what_was_drawn(tmp_path):
 # --- proofs -------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def stage(row):
+def staged(row, secrets=()):
     scenario = load_task(row.task).scenario(row.params)
     words = Words.of(row.task, row.instruction)
-    secrets = ["low_starter"]
-    with closing(Stage(scenario, row.scene_xml, row.embodiment, row.witness, words, secrets)) as made:
+    return closing(Stage(scenario, row.scene_xml, row.embodiment, row.witness, words, secrets))
+
+
+@pytest.fixture(scope="module")
+def stage(row):
+    with staged(row, ["low_starter"]) as made:
         yield made
 
 
@@ -195,6 +199,15 @@ def stage(row):
 )
 def test_sound_kinds_are_proved(stage, name, level):
     assert list(stage.proof(kinds()[name], level).faults()) == []
+
+
+@drawing
+def test_readings_of_a_scene_without_free_bodies_are_proved():
+    """The pendulum hangs on hinges."""
+    row = Pool.open(reference_pool("pendulum_grasp")).at(0)
+    with staged(row) as hanging:
+        assert not hanging.world.free_bodies
+        assert list(hanging.proof(kinds()["object_noise"], 1).faults()) == []
 
 
 def planted(monkeypatch, name, **parts):

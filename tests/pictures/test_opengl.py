@@ -135,3 +135,26 @@ def test_a_script_that_closes_nothing_ends_without_an_error(script):
     line = [sys.executable, "-c", script.format(pool=str(REFERENCE))]
     ended = subprocess.run(line, capture_output=True, text=True)
     assert ended.returncode == 0 and "Error" not in ended.stderr and "Traceback" not in ended.stderr, ended.stderr
+
+
+MUJOCO_FIRST = """
+import os
+os.environ.pop("DISPLAY", None)
+os.environ.pop("MUJOCO_GL", None)
+import mujoco
+import scengen
+from scengen.pictures.render import camera
+os.environ["MUJOCO_GL"] = {backend!r} or os.environ["MUJOCO_GL"]
+row = next(scengen.Pool.open({pool!r}).rows())
+with camera(row.scene_xml, row.embodiment, 64, 48) as eye:
+    print(eye.take().std() > 10.0)
+"""
+
+
+@drawing
+@pytest.mark.parametrize(("backend", "says"), [("", "True"), ("glfw", "set MUJOCO_GL=egl or osmesa")])
+def test_mujoco_may_be_imported_before_scengen(backend, says):
+    """MuJoCo then has contexts that need a display. Whoever asks for them by name is told so."""
+    script = MUJOCO_FIRST.format(backend=backend, pool=str(REFERENCE))
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert says in done.stdout + done.stderr

@@ -51,6 +51,7 @@ APART = {
     "scengen evaluate policy=ws://": "needs a server of policies",
     "scengen evaluate policy=zmq://": "needs a server of policies",
     "scengen studio": "runs until it is interrupted",
+    ". .venv/bin/activate": "commands are found on the path of the runner",
     "scengen site": "films and pictures of all axes: 2 minutes",
     "scengen axis card": "an hour",
     "scengen axis discover": "an hour",
@@ -65,6 +66,18 @@ def commands(*pages: Path) -> list[str]:
         block for page in pages or PAGES for block in re.findall(r"^```sh\n(.*?)^```", page.read_text(), re.M | re.S)
     ]
     return [line for block in blocks for line in block.replace("\\\n", " ").splitlines() if line.strip()]
+
+
+QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
+"""What a shell takes as it is, but for `$` and backquotes."""
+GLOBBED = re.compile(r"[\[\]{}()*?<>^!;&|]|(?<!\S)[~=]|(?<==)~")
+"""What zsh or bash expands, or takes for itself, outside quotes."""
+
+
+def globbed(command: str) -> str:
+    """What a shell would change in a command before it runs; empty if nothing. Comments do not count."""
+    found = GLOBBED.search(QUOTED.sub("", command).split(" #")[0])
+    return found[0] if found else ""
 
 
 def why_apart(command: str) -> str:

@@ -1,10 +1,11 @@
 """Every command of the pages exists with its settings; `make readme` runs them."""
 
+import re
 import shlex
 
 import pytest
 from helpers import REFERENCE
-from readme.commands import APART, PAGES, ROOT, commands, why_apart
+from readme.commands import APART, PAGES, QUOTED, ROOT, commands, globbed, why_apart
 from readme.run import run
 
 from scengen import cli, compose
@@ -17,6 +18,22 @@ LINES = [
     )
     if line.startswith("scengen ") and "/path/to/" not in line  # tests/cli/test_own_axis.py has these with a folder
 ]
+
+
+def test_no_shell_changes_a_command_that_is_pasted():
+    """zsh would take brackets for patterns of files. Other programs than scengen may use pipes and variables."""
+    pages = [*PAGES, *sorted((ROOT / "docs").rglob("*.md")), ROOT / "CONTRIBUTING.md"]
+    lines = {line for line in commands(*pages) if re.match("(scengen|pytest|make|pip) ", line)}
+    assert len(lines) > 80 and {line: globbed(line) for line in lines if globbed(line)} == {}
+    inline = re.findall("`(scengen [^`]*)`", "".join(page.read_text() for page in pages))
+    assert len(inline) > 80 and [line for line in inline if re.search(r"=\S*\[", QUOTED.sub("", line))] == []
+    assert globbed("scengen generate task.id.x=[uniform,0,1]") == "[" and globbed("scengen show to=~/x") == "~"
+    assert not globbed("scengen generate 'task.id.x=[uniform,0,1]' split=a@3+b    # (a comment) *")
+
+
+def test_the_readme_has_no_comments_behind_commands():
+    """zsh gives them to the command unless it is told otherwise, with what `;` and brackets do in them."""
+    assert [line for line in commands(ROOT / "README.md") if "#" in line] == []
 
 
 def test_what_is_left_out_is_there():

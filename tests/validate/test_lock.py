@@ -93,7 +93,7 @@ def test_a_pool_of_another_mujoco_is_declined_with_the_way_to_its_environment(po
     manifest["versions"]["mujoco"] = "3.4.0"
     (pool / "manifest.json").write_text(json.dumps(manifest))
     status, report = verified(pool, tmp_path)
-    assert status == 2 and any(f"-r {pool / lock.LOCK_FILE}" in told for told in report["remarks"])
+    assert status == 3 and any(f"-r {pool / lock.LOCK_FILE}" in told for told in report["remarks"])
 
 
 def test_a_file_that_contradicts_the_manifest_is_refuted(pool, tmp_path):

@@ -30,7 +30,7 @@ from scengen.validate.certify import Trial
 from scengen.validate.verify.claims import Claims
 from scengen.validate.verify.junit import junit
 from scengen.validate.verify.pools import Examiner, Options, _Run, verify
-from scengen.validate.verify.spot import excluded_share
+from scengen.validate.verify.spot import bound, excluded_share, possible_false
 from scengen.validate.verify.stored import settings_of_manifest, task_of_manifest
 from scengen.work.parallel import Limits
 
@@ -615,6 +615,7 @@ def test_a_sample_simulates_few_and_looks_at_all():
 def test_the_excluded_share_is_the_least_that_a_sample_meets():
     assert excluded_share(1_000_000, 300) == pytest.approx(0.00993, abs=1e-4)
     assert excluded_share(10, 10) == 0.1
+    assert possible_false(5, 1) == 4 and bound(5, 1, "rows") == "at most 80 % of the rows can be bad (95 % confidence)"
     rng = np.random.default_rng(1)
     share = excluded_share(200, 30)
     false = np.arange(200) < round(share * 200)
@@ -626,7 +627,7 @@ def test_junit_tells_every_scenario_and_survives_any_text(mine):
     changed(mine, lambda m: m["funnel"].update(certified=40))
     found = report(mine)
     found.failed[0]["reason"] += "\x1b]0;<&\x00"
-    suite = ET.fromstring(junit({"a\x07b": found}).encode()).find("testsuite")
+    suite = ET.fromstring(junit({"a\x07b": found}, found.level).encode()).find("testsuite")
     assert suite.attrib["tests"] == "7" and suite.attrib["failures"] == "1"
     assert len(suite.findall("testcase")) == 7
     told = {each.attrib["name"]: each.attrib["value"] for each in suite.findall("properties/property")}

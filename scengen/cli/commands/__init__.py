@@ -21,8 +21,8 @@ OK = 0
 """Exit status: success."""
 FAILED = 1
 """Exit status: a check failed, or not all work succeeded."""
-BAD_INPUT = 2
-"""Exit status: bad input, a fault of the machine, or no verdict."""
+DECLINED = 3
+"""Exit status: no verdict, because something cannot be judged with what is installed here, or within the limits."""
 INTERRUPTED = 130
 """Exit status after Ctrl-C."""
 

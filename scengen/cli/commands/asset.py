@@ -1,7 +1,9 @@
 """list assets, write one as a mesh, or import a mesh as a new asset"""
 
 import json
+import keyword
 import math
+import re
 from dataclasses import Field, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -112,11 +114,11 @@ def _import_mesh(settings: AssetSettings, folder: Path) -> int:
     try_folder(folder)
     if known := asset.stored_figures(request, folder):
         say(f"{folder} already holds this mesh with these settings; nothing was computed")
-        return _report(known)
+        return _report(known, folder)
     taken = asset.make_asset(request)
     figures = taken.figures()
     _write(taken, figures, folder)
-    return _report(figures)
+    return _report(figures, folder)
 
 
 def _write(taken: "MeshAsset", figures: dict[str, Any], folder: Path) -> None:
@@ -126,19 +128,20 @@ def _write(taken: "MeshAsset", figures: dict[str, Any], folder: Path) -> None:
 
     for name, content in files(taken.prop):
         write(folder / name, content)
-    write(folder / "asset.xml", taken.xml)
+    for name, content in taken.files.items():
+        write(folder / name, content)
     try:
         write(folder / "preview.png", render.encode(preview(taken.prop), "png"))
-        names = "asset.xml, asset.urdf with its meshes, asset.json and preview.png"
+        names = "prop.json, asset.xml, asset.urdf with its meshes, asset.json and preview.png"
     except render.NoPictures as error:
         remark(f"{folder} has no preview.png: {error}")
-        names = "asset.xml, asset.urdf with its meshes, and asset.json"
+        names = "prop.json, asset.xml, asset.urdf with its meshes, and asset.json"
     write(folder / "asset.json", json.dumps(figures, indent=1) + "\n")
     say(f"wrote {names} in {folder}")
 
 
-def _report(figures: dict[str, Any]) -> int:
-    """Print the figures.
+def _report(figures: dict[str, Any], folder: Path) -> int:
+    """Print the figures, and how a task uses the asset.
 
     Returns:
         Exit status: whether the asset is as accurate as requested, and comes to rest.
@@ -167,7 +170,22 @@ def _report(figures: dict[str, Any]) -> int:
         say(f"MISSED: the error of {1000 * tolerance:g} mm; allow more pieces or a larger error")
     if not rest["rests"]:
         say("MISSED: it does not come to rest; give it a flat foot, or set a smaller error")
+    say("in a task:")
+    for line in _lines(folder):
+        say(line)
     return OK if is_accurate and rest["rests"] else FAILED
+
+
+def _lines(folder: Path) -> tuple[str, str]:
+    """Lines of a family that has the asset as a field. In a package, they name it relative to the package's files."""
+    whole = folder.resolve()
+    package = next((place for place in whole.parents if (place / "__init__.py").is_file()), None)
+    where = json.dumps(str(folder), ensure_ascii=False)
+    if package is not None:
+        where = f"{json.dumps(whole.relative_to(package).as_posix(), ensure_ascii=False)}, __file__"
+    name = re.sub(r"\W+", "_", whole.name).strip("_").lower()
+    name = name if name.isidentifier() and not keyword.iskeyword(name) else "thing"
+    return "from scengen.assets.mesh_prop import MeshProp", f"{name}: MeshProp = MeshProp.load({where})"
 
 
 def _about_sides(figures: dict[str, Any]) -> str:

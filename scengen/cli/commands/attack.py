@@ -20,7 +20,7 @@ from ...samplers.task import Task
 from ...samplers.task_files import search_path
 from ...work.targets import try_file, try_folder
 from ..tables import attack_table
-from . import BAD_INPUT, FAILED, OK, Arguments, err, out, say, say_begun, warn, write_json
+from . import DECLINED, FAILED, OK, Arguments, err, out, say, say_begun, warn, write_json
 from .settings import read
 
 LEAK_DRAWS = 200
@@ -65,7 +65,7 @@ def command(arguments: Arguments) -> int:
     say(f"{report.rollouts} rollouts on {len(report.scenarios)} scenarios, {cost}; hits are in {folder}")
     if settings.json:
         write_json(settings.json, {**report.plain(), "too_easy": easy, "leaks": plain})
-    return FAILED if report.refuting or easy else BAD_INPUT if report.lost else OK
+    return FAILED if report.refuting or easy else DECLINED if report.lost else OK
 
 
 def _leaks(task: Task, settings: AttackSettings) -> Leaks:

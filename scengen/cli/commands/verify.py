@@ -2,10 +2,10 @@
 
 import secrets
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from rich.table import Table
 
@@ -31,11 +31,12 @@ from ...validate.verify.examine import Verdict
 from ...validate.verify.junit import junit
 from ...validate.verify.pools import LIMITS, Options, Report, verify
 from ...validate.verify.recheck import LEVELS
+from ...validate.verify.spot import bound
 from ...validate.verify.stored import task_of_manifest as stored_task
 from ...work.limits import at_least
 from ...work.parallel import Limits, WorkerDied, Workers, apart
 from ...work.targets import try_file
-from . import BAD_INPUT, FAILED, OK, Arguments, err, intake, out, say, several, warn, write, write_json
+from . import DECLINED, FAILED, OK, Arguments, err, intake, out, say, several, warn, write, write_json
 from .settings import read
 
 ALL = "all"
@@ -46,7 +47,7 @@ SKIP = "skip"
 """Value of `others` for a run that checks only its sample."""
 OTHERS = ("check", SKIP)
 """Values of `others`."""
-STATUS: dict[Verdict, int] = {"sound": OK, "refuted": FAILED, "declined": BAD_INPUT}
+STATUS: dict[Verdict, int] = {"sound": OK, "refuted": FAILED, "declined": DECLINED}
 """Exit status by verdict."""
 WORST = {verdict: STATUS[verdict] for verdict in ("refuted", "declined", "sound")}
 """Exit status by verdict, in the order in which verdicts decide about multiple pools."""
@@ -89,17 +90,55 @@ def command(arguments: Arguments) -> int:
     try_file(settings.json)
     try_file(settings.junit)
     if settings.hits is not None:
+        for name in ("sample", "ycb", "apart", "json", "junit"):
+            if getattr(settings, name) is not None:
+                raise BadConfig(f"{name} is not for hits: leave it out")
         return _replay_hits(settings.hits, settings.pool, search_path(arguments))
     if settings.results is not None:
         return _audit_results(Path(settings.results), settings, search_path(arguments))
     if settings.pool is None:
         raise BadConfig("verify needs pool=FOLDER, results=FOLDER, hits=FILE or task=NAME; see scengen verify --help")
-    demonstrated = [f for f in demonstration_folders(settings.pool) if is_demonstrations(f)]
-    if demonstrated:
-        return _replay_demonstrations(demonstrated, settings, search_path(arguments))
+    with _reported(settings) as reports:
+        demonstrated = [f for f in demonstration_folders(settings.pool) if is_demonstrations(f)]
+        if not demonstrated:
+            return _verify_pools(several(settings.pool), settings, search_path(arguments), reports)
+    return _replay_demonstrations(demonstrated, settings, search_path(arguments))
+
+
+@contextmanager
+def _reported(settings: VerifySettings) -> Iterator[dict[str, Report | str]]:
+    """Reports by pool, which become the file for CI systems. An error is the report of the pool in which it occurred.
+
+    A pool that is not verified yet has an empty report.
+    """
+    reports: dict[str, Report | str] = {}
+    try:
+        yield reports
+    except Exception as error:
+        given = settings.pool if isinstance(settings.pool, str) else ",".join(settings.pool or ())
+        reports[next((pool for pool, report in reports.items() if not report), given)] = str(error)
+        raise
+    finally:
+        if settings.junit and all(reports.values()) and reports:
+            write(Path(settings.junit), junit(reports, settings.level))
+
+
+def _verify_pools(
+    folders: Sequence[str], settings: VerifySettings, search: Sequence[str], reports: dict[str, Report | str]
+) -> int:
+    """Verify pools.
+
+    Args:
+        reports: gets the report on each pool, by its folder.
+
+    Returns:
+        Exit status.
+
+    Raises:
+        BadConfig: a setting is for demonstrations, or for scans that a pool does not hold.
+    """
     if settings.apart is not None:
         raise BadConfig("apart is for demonstrations, which may be kept apart from pools: leave it out")
-    folders = several(settings.pool)
     if settings.ycb is not None:
         for folder in folders:
             if not Pool.open(folder).manifest.task_node.get("scans"):
@@ -114,24 +153,26 @@ def command(arguments: Arguments) -> int:
         limits,
         attacked,
     )
-    reports: dict[str, Report] = {}
-    plain: dict[str, dict[str, Any]] = {}
+    found: dict[str, Report] = {}
     for folder in folders:
+        reports[folder] = ""
         pool = Pool.open(folder)
         with ProgressBar(err, f"verify {folder}", len(pool), settings.workers) as progress_bar:
-            report = verified(pool, options, search_path(arguments), progress_bar.show)
-        report = reports[folder] = _with_scans(report, pool, settings.ycb)
-        about = {key: value for key, value in vars(report).items() if key != "names"}
-        plain[folder] = {"pool_sha256": pool.sha256, **about}
-        _print_report(pool, report)
+            report = verified(pool, options, search, progress_bar.show)
+        reports[folder] = found[folder] = _with_scans(report, pool, settings.ycb)
+        _print_report(pool, found[folder])
     if settings.json:
+        plain = {folder: _plain(report) for folder, report in found.items()}
         write_json(settings.json, plain[folders[0]] if len(folders) == 1 else plain)
-    if settings.junit:
-        write(Path(settings.junit), junit(reports))
-    verdicts = Counter(report.verdict for report in reports.values())
+    verdicts = Counter(report.verdict for report in found.values())
     if len(folders) > 1:
         say(f"{len(folders)} pools: {', '.join(f'{verdicts[v]} {v}' for v in STATUS)}")
     return next(status for verdict, status in WORST.items() if verdicts[verdict])
+
+
+def _plain(report: Report) -> dict[str, object]:
+    """A report as plain data."""
+    return {key: value for key, value in vars(report).items() if key != "names"}
 
 
 def without_expired(arguments: Arguments) -> Arguments:
@@ -196,7 +237,7 @@ def _reproduce(chosen: str, settings: VerifySettings, search: Sequence[str]) -> 
     """Compare tasks with their stored behaviour, and print a table.
 
     Returns:
-        Exit status: 1 if a task has another verdict, draw, scene or rule than stored, 2 if one could not be compared.
+        Exit status: 1 if a task has another verdict, draw, scene or rule than stored, 3 if one could not be compared.
 
     Raises:
         BadConfig: a setting is given that is for pools.
@@ -238,7 +279,7 @@ def _reproduce(chosen: str, settings: VerifySettings, search: Sequence[str]) -> 
         write_json(settings.json, [asdict(one) for one in found])
     counts = Counter(one.compared.reproduces if one.compared else "unknown" for one in found)
     say(f"{len(found)} tasks: {', '.join(f'{count} {what}' for what, count in counts.items())}")
-    return FAILED if counts["no"] else BAD_INPUT if counts["unknown"] else OK
+    return FAILED if counts["no"] else DECLINED if counts["unknown"] else OK
 
 
 def _replay_hits(hits: str, pool: str | list[str] | None, search: Sequence[str]) -> int:
@@ -399,8 +440,8 @@ def _print_report(pool: Pool, report: Report) -> None:
     if pool.manifest.is_subset:
         say("a subset: its scenarios were chosen from another pool, and its rejection report is that of the other pool")
     if report.sample:
-        share, size, seed = (report.sample[name] for name in ("excluded_share", "size", "seed"))
-        bound = f"fewer than {100 * share:.3g} % of all scenarios can fail this level (95 % confidence)"
-        say(f"sample: {size} of {len(pool)} scenarios simulated, seed {seed}; if none of them fails, {bound}")
+        size, of, seed = (report.sample[name] for name in ("size", "of", "seed"))
+        shown = f": {bound(of, size, 'scenarios')}" if report.holds else ""
+        say(f"sample: {size} of {of} scenarios simulated, seed {seed}{shown}")
     parts = ", ".join([f"{report.sound} sound, {report.refuted} refuted, {report.declined} declined", *done])
     say(f"{pool.folder}: {report.verdict} at level {report.level}: {parts}")

@@ -14,7 +14,7 @@ from ...samplers.task_files import search_path
 from ...validate.verify.recheck import LEVELS
 from ...work.limits import at_least
 from ...work.targets import try_file
-from . import BAD_INPUT, FAILED, OK, Arguments, err, out, remark, say, several, write_json
+from . import DECLINED, FAILED, OK, Arguments, err, out, remark, say, several, write_json
 from .settings import read
 
 MODULE = "scengen.drift.judge"
@@ -60,7 +60,7 @@ def command(arguments: Arguments) -> int:
         say(f"mujoco {version}: {', '.join(f'{counts[name]} {name}' for name in counts if name != 'checks')}")
     if any(counts[FLIPPED] for counts in totals.values()):
         return FAILED
-    return BAD_INPUT if any(counts[UNKNOWN] for counts in totals.values()) else OK
+    return DECLINED if any(counts[UNKNOWN] for counts in totals.values()) else OK
 
 
 def _judged(

@@ -12,7 +12,7 @@ from ...samplers.task_files import search_path
 from ...work.limits import at_least
 from ...work.parallel import Limits, Workers
 from ...work.targets import try_file
-from . import FAILED, OK, Arguments, err, names, out, say, several, warn, write_json
+from . import DECLINED, FAILED, OK, Arguments, err, names, out, say, several, warn, write_json
 from .settings import read
 
 
@@ -63,11 +63,13 @@ def command(arguments: Arguments) -> int:
         table.add_row(task, str(len(those)), str(sum(c.agrees for c in those)), f"{1000 * apart:.4f}", f"{later:.2f}")
     out.print(table)
     same = sum(comparison.agrees for comparison in found)
+    unknown = sum("unknown" in (comparison.ours, comparison.theirs) for comparison in found)
     holds = same >= settings.limit * total
     if settings.json:
         hashes = {str(pool.folder): pool.sha256 for pool in pools}
         plain = [asdict(comparison) for comparison in found]
         write_json(settings.json, {"pools": hashes, "limit": settings.limit, "same": same, "scenarios": plain})
     limit = f"the limit of {settings.limit:.0%} is {'reached' if holds else 'MISSED'}"
-    say(f"{same} of {total} scenarios have the same verdict in robosuite; {limit}")
-    return OK if holds else FAILED
+    lost = f", {unknown} are unknown" if unknown else ""
+    say(f"{same} of {total} scenarios have the same verdict in robosuite{lost}; {limit}")
+    return OK if holds else DECLINED if same + unknown >= settings.limit * total else FAILED

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ...episode import STRICT
-from ...errors import Infeasible, ScengenError
+from ...errors import Infeasible, ScengenError, contrasted
 from ...export.dataset import TASK_VERSION
 from ...export.recording import EPISODE_COLUMNS
 from ...pool.columns import plain_value
@@ -39,7 +39,8 @@ def wrong_labels(
     made = {"id": scenario.id, "code": task.code, "scene_sha256": sha256(text), "axes": _axes(stored)}
     for name, here in made.items():
         if plain_value(here) != (there := stored.get(f"scengen/{name}")):
-            yield label(name, f"is {ascii(there)[:60]}, not {ascii(here)[:60]}")
+            told, found = contrasted(ascii(there), ascii(here))
+            yield label(name, f"is {told}, not {found}")
     yield from _differences(stored, task, instruction)
     yield from _wrongly_drawn(stored, task)
 
@@ -75,8 +76,8 @@ def _differences(stored: Mapping[str, Any], task: Task, instruction: str | None)
     installed[TASK_VERSION] = task.version
     for name, here in installed.items():
         if (there := stored.get(name, here)) != here:
-            why = f"{name} is {ascii(there)[:100]}, that of the installed task is {ascii(here)[:100]}"
-            yield Finding("TASK", "warning", (), {}, why)
+            told, own = contrasted(ascii(there), ascii(here), 100)
+            yield Finding("TASK", "warning", (), {}, f"{name} is {told}, that of the installed task is {own}")
 
 
 def _wrongly_drawn(stored: Mapping[str, Any], task: Task) -> Iterator[Finding]:

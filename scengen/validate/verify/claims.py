@@ -11,7 +11,7 @@ import numpy as np
 from ...certificate import CHECKS, Check, as_json, from_json
 from ...control.loop import ACTION, Loop
 from ...control.teleop import ALPHA, LARGEST_CHANGE, MOTION
-from ...errors import Infeasible, ScengenError
+from ...errors import Infeasible, ScengenError, contrasted
 from ...params import canonical
 from ...pool import Pool, PoolRow
 from ...pool.files import sha256
@@ -90,7 +90,8 @@ def wrong_labels(row: PoolRow, claims: Claims) -> Iterator[str]:
         told[name] = (getattr(certificate, name), getattr(manifest, name))
     for name, (here, there) in told.items():
         if here != there:
-            yield f"the {name} is {_short(here)}, the manifest says {_short(there)}"
+            told, said = contrasted(ascii(here), ascii(there))
+            yield f"the {name} is {told}, the manifest says {said}"
     if row.index >= manifest.indices:
         yield f"the index {row.index} is none of the {manifest.indices} that the manifest counts"
 
@@ -133,7 +134,8 @@ def wrongly_drawn(row: PoolRow, claims: Claims) -> Iterator[str]:
     for name, there in labels_of_draw(draw).items():
         here = getattr(row, name)
         if name != "params" and comparable(here) != comparable(there):  # the id covers params
-            yield OfCode(f"the {name} is {_short(comparable(here))}; drawn again it is {_short(comparable(there))}")
+            told, drawn = contrasted(ascii(comparable(here)), ascii(comparable(there)))
+            yield OfCode(f"the {name} is {told}; drawn again it is {drawn}")
 
 
 def comparable(value: Any) -> Any:

@@ -1,7 +1,8 @@
 """Examination of a scenario of a pool, or of a piece of its run, in a process that can be ended: static facts first."""
 
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from ...errors import ScengenError
@@ -44,6 +45,8 @@ class Examination:
     """Whether it is declined because it was certified against another version of the task, where something differs."""
     drifted: bool = False
     """Whether the replay reaches the goal, but ends in other bits than on the machine of the certificate."""
+    seconds: float | None = None
+    """Duration of the examination [s]; None if it did not end."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,12 @@ class Examiner:
     adversary: Adversary | None = None
 
     def __call__(self, job: Job) -> Answer:
+        begun = time.perf_counter()
+        answer = self._answer(job)
+        timed = isinstance(answer, Examination)
+        return replace(answer, seconds=round(time.perf_counter() - begun, 3)) if timed else answer
+
+    def _answer(self, job: Job) -> Answer:
         try:
             if isinstance(job, range):
                 return survey.draw_again(job, self.claims)

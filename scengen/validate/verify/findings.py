@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...certificate import CHECKS
-from ...errors import PoolError, cut
+from ...errors import PoolError, contrasted, cut
 from ...installation import versions
 from ...pool.manifest import MANIFEST
 from ...samplers.task import Task
@@ -22,6 +22,8 @@ from .recheck import MADE_AGAIN
 class Report:
     """Result of the verification of a pool."""
 
+    pool_sha256: str
+    """Hash of the pool's manifest."""
     verdict: Verdict
     level: str
     checked: int
@@ -56,7 +58,7 @@ class Report:
     remarks: list[str]
     """Facts that a reader should know although nothing is wrong."""
     examinations: list[dict[str, Any]]
-    """`id`, `verdict` and `reason` of every scenario."""
+    """`id`, `verdict` and `reason` of every scenario, whether it was `simulated`, and the `seconds` that it took."""
     names: dict[str, str]
     """Names of the scenarios in `failed`, by id."""
 
@@ -68,8 +70,8 @@ class Report:
 class Findings:
     """Collects findings."""
 
-    def __init__(self, level: str):
-        self.level = level
+    def __init__(self, level: str, pool_sha256: str):
+        self.level, self.pool_sha256 = level, pool_sha256
         self.task_versions: list[int] = []
         self.claimed_checks: list[str] = []
         self.failed: list[dict[str, str]] = []
@@ -163,6 +165,7 @@ class Findings:
         simulated = sum(e.simulated for e in self.examinations)
         failed = self.failed + [f for f in faults if f["verdict"] != "sound"]
         return Report(
+            pool_sha256=self.pool_sha256,
             verdict=self.pool_verdict,
             level=self.level,
             checked=len(verdicts),
@@ -183,7 +186,10 @@ class Findings:
             differences=self.differences,
             sample=self.sample,
             remarks=self.remarks,
-            examinations=faults,
+            examinations=[
+                {**fault, "simulated": e.simulated, "seconds": e.seconds}
+                for fault, e in zip(faults, self.examinations, strict=True)
+            ],
             names={id_: self.names[id_] for f in failed if (id_ := f["id"]) in self.names},
         )
 
@@ -204,7 +210,8 @@ def wrong_names(installed: Task, stored: Task) -> Iterator[str]:
     for name in ("code", "category"):
         here, there = getattr(installed, name), getattr(stored, name)
         if here != there:
-            yield f"the {name} is {there[:60]!a}, that of the task is {here!a}"
+            told, own = contrasted(ascii(there), ascii(here))
+            yield f"the {name} is {told}, that of the task is {own}"
 
 
 def differences(installed: Any, stored: Any, key: str = "") -> Iterator[dict[str, str]]:
@@ -214,7 +221,8 @@ def differences(installed: Any, stored: Any, key: str = "") -> Iterator[dict[str
             below = f"{key}.{name}".strip(".")
             yield from differences(installed.get(name, _ABSENT), stored.get(name, _ABSENT), below)
     elif installed != stored:
-        yield {"key": key, "pool": _shown(stored), "installed": _shown(installed)}
+        told, here = contrasted(_shown(stored), _shown(installed), 200)
+        yield {"key": key, "pool": told, "installed": here}
 
 
 _ABSENT: Any = object()
@@ -225,4 +233,4 @@ def _shown(value: Any) -> str:
     if value is _ABSENT:
         return "(not there)"
     text = str(value)
-    return (text if text.isascii() and text.isprintable() else ascii(text)[1:-1])[:200]
+    return text if text.isascii() and text.isprintable() else ascii(text)[1:-1]

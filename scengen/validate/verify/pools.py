@@ -64,7 +64,7 @@ def verify(
         levels: the settings that belong to a name such as `quick`, for this task.
         progress: called with the number of scenarios that have been checked.
     """
-    found = Findings(options.level)
+    found = Findings(options.level, pool.sha256)
     for name, what in pool.damaged().items():
         found.of_pool(name, "refuted", f"the shard {what}")
     other = installed.other_version("certified against", pool.manifest.task_version)

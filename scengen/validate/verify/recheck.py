@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...certificate import CHECKS, Check, as_json
-from ...errors import NoOracle, ScengenError
+from ...errors import NoOracle, ScengenError, contrasted
 from ...pool import PoolRow
 from ...pool.manifest import without_numbers
 from ...scenario import Scenario
@@ -216,7 +216,8 @@ def _differences(found: Check, stored: Check, exact: bool) -> Iterator[str]:
     if not found.passed and not found.waived:
         yield f"check {found.name} fails: {found.reason}"
     elif exact and not alike(found.numbers, stored.numbers):
-        yield f"check {found.name} has other numbers when it is made again: {as_json(found.numbers)[:160]}"
+        made, told = contrasted(as_json(found.numbers), as_json(stored.numbers), 160)
+        yield f"check {found.name} has other numbers when it is made again: {made}; the pool says {told}"
 
 
 def _stored_check(row: PoolRow, name: str) -> Check:

@@ -1,16 +1,31 @@
 """Statistics of a random sample of the rows of a pool."""
 
-from math import comb, exp, lgamma
+from math import ceil, comb, exp, lgamma
 
 CONFIDENCE = 0.95
 """Probability with which a sample meets a false row."""
 
 
 def excluded_share(total: int, sample: int) -> float:
-    """The smallest share of false rows that a sample without a false row excludes at 95 %.
+    """The smallest share of false rows that a sample without a false row excludes at 95 %."""
+    return (possible_false(total, sample) + 1) / total
 
-    If at least this share of the rows were false, a sample of this size would contain one with a probability of at
-    least 95 % (hypergeometric: rows are drawn without replacement). 300 of a million rows exclude 1 %.
+
+def bound(total: int, sample: int, rows: str) -> str:
+    """The largest share of false rows after a sample without one, as text.
+
+    Args:
+        rows: what the rows are, such as "scenarios".
+    """
+    share = ceil(1000 * possible_false(total, sample) / total) / 10
+    return f"at most {share:g} % of the {rows} can be bad (95 % confidence)"
+
+
+def possible_false(total: int, sample: int) -> int:
+    """Largest number of false rows that a sample without a false row leaves possible at 95 %.
+
+    If more of the rows were false, a sample of this size would contain one with a probability of at least 95 %
+    (hypergeometric: rows are drawn without replacement). Of a million rows, a sample of 300 leaves 1 %.
     """
     low, high = 0, total - sample + 1  # with so many false rows every sample contains one
     while high - low > 1:
@@ -19,7 +34,7 @@ def excluded_share(total: int, sample: int) -> float:
             high = middle
         else:
             low = middle
-    return high / total
+    return low
 
 
 def _missed(total: int, sample: int, false: int) -> float:
