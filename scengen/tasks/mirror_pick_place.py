@@ -23,8 +23,9 @@ Decisions, where the paper (App. B, M01) is silent, and its text contradicts its
 * A miss costs nothing but time. A hand that closes where the picture shows the cube, feels nothing, and goes to the
   opposite place lifts the cube at 8 s (12 of 12, on `flipped` with one more try 4 of 4). The task asks a policy to
   notice the turned frame before or after a miss; a success does not show which. A palm that sweeps the table until the
-  wrist feels the cube lifts it without a picture (27 of 36). That is labelled: the cube is not between the fingers when
-  the robot first touches it.
+  wrist feels the cube lifts it without a picture (27 of 36), and so does a level open jaw that sweeps it like a fork
+  and shifts to the side on which a finger meets the cube (6 of 10). Both are labelled: the cube is not between the
+  fingers, away from the palm, when the robot first touches it.
 * The cube stands at least 7 cm from the middle lines of the view: else some orientation shows it where it is.
 
 Axes. The paper has none. Those of `view` test the eye alone: memory, which has none, cannot distinguish them from
@@ -76,7 +77,7 @@ TRAINING_VIEW = VIEWS[1]  # orientation that a policy learns here: the paper's
 class MirrorPickPlace(Scenario):
     """One cube on the table, and pictures that are not upright."""
 
-    VERSION = 3
+    VERSION = 4
     HOLD = 0.3
     NO_ABLATIONS = "the cube is lifted with the hand alone, and what is turned is the picture, which no scene holds"
 

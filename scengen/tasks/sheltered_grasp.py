@@ -24,8 +24,9 @@ Decisions, where the paper (App. B, T03) is silent:
   then into the other. The paper calls this exploring. So there is no `answer`.
 * Exploring is looking: the object is between the fingers at the first touch, and the jaw closes in the rack on nothing
   else. Otherwise closed fingers that sweep each storey drive the object to a place where the jaw takes it (32 of 48),
-  or feel for it with short thrusts (32 of 48). A blind jaw that closes at three places one after the other finds it in
-  11 to 18 of 48 scenes. These are labelled, unless the first place is right. The opening between the rack's ends is not
+  or feel for it with short thrusts (32 of 48). An open jaw that passes over the object and is lowered on it feels the
+  side to shift to (8 of 12). A blind jaw that closes at three places one after the other finds it in 11 to 18 of 48
+  scenes. These are labelled, unless the first place is right (10 of 48). The opening between the rack's ends is not
   much wider than the hand. In a rack of 50 cm three places would leave 10 of 60, but there an approach that is learned
   relative to the object would serve turned racks, too.
 * The tray needs no look in training: one fixed place serves 82 % of the scenes.
