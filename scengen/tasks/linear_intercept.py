@@ -23,6 +23,8 @@ Decisions, where the paper (App. B, T12) is silent:
 * All paths lead towards the middle. A hand at the best one of 25 places, which corrects its place by 2 cm when the ball
   is near, catches 15 of 60. The start x reveals most of the drift (r2 0.87): a hand that waits where balls from there
   usually pass, and follows 21 mm by place alone, catches 15 of 24 without the velocity. Both are fair.
+* A jaw that waits 10 mm wider than the ball may close when the ball is there, without a lead (4 of 8; 7 of 8 with a
+  lead of 30 ms). That is fair: place and course are predicted.
 * The ball rests at first, near the left edge, and is launched, rolling, at a moment that the robot does not know.
 * "Above the table" means 4 cm higher than on the table, as in robosuite's Lift, held by the robot and by nothing else
   for the paper's 30 steps.
