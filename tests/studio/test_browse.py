@@ -57,7 +57,7 @@ def test_browse_play_scrub_find_and_see_the_twin(chromium, opened, shifted, tmp_
         browser._find.value = last.id
         page.get_by_text(str(last)).first.wait_for()
         browser._find.value = "nothing-like-it"
-        page.get_by_role("alert").get_by_text("nothing-like-it").wait_for()
+        page.locator(".studio-fault").get_by_text("nothing-like-it").wait_for()
         assert str(last) in tab.text() and "jittered runs succeed" in tab.text(), "the page stays"
         browser._pool.value = browser._pool.options[1]
         page.get_by_text("moved out of training").wait_for()
@@ -66,7 +66,14 @@ def test_browse_play_scrub_find_and_see_the_twin(chromium, opened, shifted, tmp_
         tab.wait(lambda: browser._label is not None, "a training twin")
         assert len(browser._twin._frames) < len(browser._view._frames)  # a twin has no robot
         page.wait_for_timeout(3000)
+        assert not page.locator("#webgl-software-rendering").is_visible()
         page.screenshot(path=str(tmp_path / "browse.png"))
+        page.set_viewport_size({"width": 375, "height": 800})
+        scene, panel = page.locator("canvas").first, page.get_by_text("scengen studio", exact=True)
+        tab.wait(lambda: 300 < scene.bounding_box()["height"] < 400, "a phone's layout")
+        assert page.evaluate("document.documentElement.scrollWidth") == 375
+        assert panel.bounding_box()["y"] >= scene.bounding_box()["height"] > 300
+        page.set_viewport_size({"width": 1280, "height": 800})
         browser._what.value = browser._what.options[1]
         browser._run(browser._play)
         page.get_by_text(f"{browser._what.value}: ").wait_for()
@@ -151,10 +158,10 @@ def test_a_hostile_pool_runs_no_script(chromium, opened, tmp_path, texts):
     rewritten(folder, change)
     with running(content_of(folder)) as studio:
         tab = opened(studio.address)
-        tab.page.wait_for_selector(".studio-scenario, [role=alert]")
+        tab.page.wait_for_selector(".studio-scenario, .studio-fault")
         tab.page.wait_for_timeout(4000)
         assert tab.page.evaluate("window.hacked") is None and not tab.faults
-        shown = tab.page.locator("[role=alert], .studio-scenario").first
+        shown = tab.page.locator(".studio-fault, .studio-scenario").first
         assert shown.is_visible()
         assert not tab.page.locator(".studio-scenario img, .studio-scenario script, .studio-scenario iframe").count()
         assert not tab.page.locator(".studio-scenario svg, .studio-scenario a, .studio-scenario style").count()
