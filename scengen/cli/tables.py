@@ -13,6 +13,7 @@ from ..certificate import STAGES
 from ..evidence import ledger
 from ..evidence.ledger import Evidence
 from ..pool import Pool, PoolRow
+from ..pool.demonstrations import POLICY, SCRIPTED, TELEOP, Demonstrations
 from ..runs.generate import Summary
 from ..samplers.axis import Axis, spell
 from ..samplers.dists import Fixed
@@ -87,6 +88,30 @@ def pool_table(pool: Pool) -> Table:
         table.add_row(str(called), ", ".join(f"{name}={params[name]:.4g}" for name in shown))
     if len(pool) > len(rows):
         table.title = f"{table.title}: the first {len(rows)} of {len(pool)} scenarios"
+    return table
+
+
+def nature(source: Demonstrations) -> str:
+    """What a folder of demonstrations holds, in one line."""
+    about = source.manifest
+    task, solved = f"{about.config.task['name']}/{about.config.split}", sum(shard.rows for shard in about.shards)
+    failed = about.failed.rows if about.failed else 0
+    changed = f" under {about.condition}" if about.condition else ""
+    whose = {
+        SCRIPTED: f"demonstrations of {task} by the oracle",
+        TELEOP: f"demonstrations of {task} by person {about.operator}",
+        POLICY: f"kept rollouts of policy {about.policy} on {task}{changed}",
+    }[about.source]
+    lost = f", {failed} that failed" if about.failed else ", failed ones not kept"
+    return f"{source.folder}: {whose}, {about.config.rules} rules: {solved} successes{lost}"
+
+
+def runs_table(source: Demonstrations) -> Table:
+    """One line for each kept run of demonstrations, at most `LINES`."""
+    table = Table("scenario", "run", "style", "outcome", "time [s]", "reason")
+    table.columns[0].no_wrap = True  # users copy names
+    for row in islice(source.attempts(), LINES):
+        table.add_row(str(row.name), str(row.run), row.style, row.outcome, f"{row.seconds:.2f}", row.reason)
     return table
 
 

@@ -13,7 +13,7 @@ from ..errors import PoolError, ScengenError
 from ..work.typed import typed
 from . import writing
 from .files import read_json_file, replace_file
-from .kinds import MARKS, check_one, marks
+from .kinds import MARKS, check_one, check_there, marks
 from .manifest import (
     MAX_INDICES,
     MAX_SHARDS,
@@ -124,12 +124,8 @@ class DemonstrationManifest:
         Raises:
             PoolError: it does not exist, it is damaged, or it is of another format.
         """
-        check_one(folder)
+        check_there(folder, DEMONSTRATIONS, "demos")
         path = folder / DEMONSTRATIONS
-        if not path.is_file():
-            begun = Path(f"{folder}.run").is_dir()
-            hint = "a run was started there; repeat its command to finish it" if begun else "see scengen demos"
-            raise PoolError(f"no demonstrations at {folder}: {DEMONSTRATIONS} is missing; {hint}")
         try:
             plain = dict(check_mapping("the manifest", read_json_file(path)))
             version = plain.pop("format")

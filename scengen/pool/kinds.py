@@ -43,3 +43,21 @@ def check_target(folder: str | Path, mark: str = "", setting: str = "to") -> Non
     """
     if others := [other for other in marks(folder) if other != mark]:
         raise PoolError(f"{folder} is {MARKS[others[0]]} already ({others[0]}); choose another {setting}=")
+
+
+def check_there(folder: Path, mark: str, maker: str) -> None:
+    """Raise `PoolError` if a folder is not what its file `mark` says; the reason names what it is instead.
+
+    Args:
+        maker: command that makes such a folder.
+    """
+    check_one(folder)
+    if (folder / mark).is_file():
+        return
+    if others := marks(folder):
+        why = f"it is {MARKS[others[0]]} ({others[0]})"
+    elif Path(f"{folder}.run").is_dir():
+        why = f"{mark} is missing; a run was started there; repeat its command to finish it"
+    else:
+        why = f"{mark} is missing; see scengen {maker}"
+    raise PoolError(f"no {MARKS[mark].removeprefix('a ')} at {folder}: {why}")

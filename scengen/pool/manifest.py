@@ -11,7 +11,7 @@ from ..errors import PoolError, ScengenError
 from ..work.typed import typed
 from .files import FileEntry as FileEntry
 from .files import read_json_file, replace_file
-from .kinds import check_one
+from .kinds import check_there
 from .untrusted import (
     HASH,
     SHORT_HASH,
@@ -118,12 +118,8 @@ class Manifest:
         Raises:
             PoolError: it does not exist, it is damaged, or it is of another format.
         """
-        check_one(folder)
+        check_there(folder, MANIFEST, "generate")
         path = folder / MANIFEST
-        if not path.is_file():
-            begun = Path(f"{folder}.run").is_dir()
-            hint = "a run was started there; repeat its command to finish it" if begun else "see scengen generate"
-            raise PoolError(f"no pool at {folder}: {MANIFEST} is missing; {hint}")
         try:
             plain = read_json_file(path)
             version = plain["format"]

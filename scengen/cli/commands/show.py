@@ -1,7 +1,8 @@
 """print the contents of a pool or of one scenario, and draw them"""
 
 import json
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from ...ood.analysis.redraw import task_of
 from ...pictures import film, render
 from ...pictures.sheet import contact_sheet
 from ...pool import Pool
+from ...pool.demonstrations import Demonstrations, is_demonstrations
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
 from ...validate.playable import check_row
@@ -52,7 +54,9 @@ def command(arguments: Arguments) -> int:
                 f"to = {target}; give an .html file for a contact sheet, or id= for a film strip of one scenario"
             )
         try_file(target)
-        pools = [Pool.open(folder).check() for folder in several(settings.pool)]
+        if any(map(is_demonstrations, folders := several(settings.pool))):
+            return _show_runs(settings, folders)
+        pools = [Pool.open(folder).check() for folder in folders]
         if len(pools) > MAX_DETAILED_POOLS:
             out.print(tables.pools_table(pools))
         else:
@@ -85,6 +89,21 @@ def command(arguments: Arguments) -> int:
         say(f"wrote {target}")
     if settings.json:
         write_json(settings.json, data)
+    return OK
+
+
+def _show_runs(settings: ShowSettings, folders: Sequence[str]) -> int:
+    """Print what demonstrations or rollouts of a policy are, with a line for each run."""
+    if settings.to:
+        hint = "scengen show film pool=... id=... draws one run"
+        raise BadConfig(f"to = {settings.to}; a contact sheet shows pools, and {folders[0]} is demonstrations; {hint}")
+    sources = [Demonstrations.open(folder).check() for folder in folders]
+    for source in sources:
+        say(tables.nature(source))
+        out.print(tables.runs_table(source))
+    if settings.json:
+        plain = [{"folder": str(each.folder), "is": tables.nature(each), **asdict(each.manifest)} for each in sources]
+        write_json(settings.json, plain)
     return OK
 
 
