@@ -141,7 +141,7 @@ def test_results_of_another_search_are_not_taken_for_its_own(world_where, tmp_pa
     identity, *records = log.read_text().splitlines(keepends=True)
     earlier = {name: value for name, value in json.loads(identity).items() if name != "fixed"}
     log.write_text(json.dumps(earlier) + "\n" + "".join(records))
-    with pytest.raises(BadConfig, match=r"other pools or settings \(fixed\); choose another to="):
+    with pytest.raises(BadConfig, match=r"other pools or settings \(fixed\); give fresh=true .* choose another to="):
         search(TASK, SHORT, tmp_path, rounds=1)
 
 

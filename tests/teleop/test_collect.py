@@ -10,7 +10,8 @@ import pytest
 from helpers import REFERENCE
 
 from scengen import cli
-from scengen.cli.commands import BAD_INPUT, FAILED, OK
+from scengen.cli import BAD_INPUT
+from scengen.cli.commands import FAILED, OK
 from scengen.demos.teleop.pad import read_events
 from scengen.means import throughout
 from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations, write_demonstrations
