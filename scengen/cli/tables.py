@@ -14,6 +14,7 @@ from ..evidence import ledger
 from ..evidence.ledger import Evidence
 from ..pool import Pool, PoolRow
 from ..pool.demonstrations import POLICY, SCRIPTED, TELEOP, Demonstrations
+from ..pool.row import DemonstrationRow
 from ..runs.generate import Summary
 from ..samplers.axis import Axis, spell
 from ..samplers.dists import Fixed
@@ -107,11 +108,16 @@ def nature(source: Demonstrations) -> str:
 
 
 def runs_table(source: Demonstrations) -> Table:
-    """One line for each kept run of demonstrations, at most `LINES`."""
-    table = Table("scenario", "run", "style", "outcome", "time [s]", "reason")
+    """One line for each scenario of demonstrations, at most `LINES`, with its kept runs and why some failed."""
+    runs = dict[str, list[DemonstrationRow]]()
+    for row in source.attempts():
+        runs.setdefault(str(row.name), []).append(row)
+    table = Table("scenario", "runs", "solved", "failed because")
     table.columns[0].no_wrap = True  # users copy names
-    for row in islice(source.attempts(), LINES):
-        table.add_row(str(row.name), str(row.run), row.style, row.outcome, f"{row.seconds:.2f}", row.reason)
+    for name, rows in islice(runs.items(), LINES):
+        reasons = dict.fromkeys(row.reason for row in rows if row.reason)
+        solved = sum(row.outcome == "success" for row in rows)
+        table.add_row(name, str(len(rows)), str(solved), "; ".join(reasons))
     return table
 
 

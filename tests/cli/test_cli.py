@@ -200,6 +200,14 @@ def test_an_axis_from_the_command_line_is_proved_like_any_other(capsys, tmp_path
     assert said(capsys, *GENERATE, same, "split=slick")[0] == 2
 
 
+def test_a_finished_pool_does_not_lose_scenarios_by_a_smaller_n(capsys, made):
+    there, before = len(Pool.open(made)), Pool.open(made).sha256
+    assert cli.run(("generate", "task=domino_single", f"n={there - 1}", f"pool={made}")) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"has {there} scenarios, of which {there - 1} would be left: give n={there} or more" in said
+    assert Pool.open(made).sha256 == before
+
+
 def test_show_prints_pools_and_scenarios(capsys, made):
     row = next(Pool.open(made).rows())
     assert cli.run(("show", f"pool={made}")) == 0 and row.id in capsys.readouterr().out

@@ -140,7 +140,7 @@ def test_clean_episodes_are_not_flagged_and_all_are_kept(clean, tmp_path):
     found = curated(folder)
     assert [report.findings for report in found.reports] == [()] * 4
     assert found.kept == (0, 1, 2, 3) and all("replay" in report.checks for report in found.reports)
-    assert found.funnel == {"recorded": 4, "scored": 4, "without findings": 4, "kept": 4}
+    assert found.funnel == {"recorded": 4, "scored": 4, "without errors": 4, "kept": 4}
     told = json.loads((folder / "meta" / "scengen.json").read_text())
     assert told["curation"]["funnel"]["kept"] == 4 and told["versions"], "what stood there is kept"
 

@@ -35,6 +35,19 @@ def rollouts(folder, policy):
     return Demonstrations.open(folder / policy / "rollouts" / REFERENCE.name)
 
 
+def test_show_says_what_kept_rollouts_are(kept, capsys):
+    folder = rollouts(kept, "random").folder
+    assert cli.run(["show", f"pool={folder}"]) == 0
+    out = capsys.readouterr()
+    shown = " ".join((out.out + out.err).split())
+    assert "kept rollouts of policy random on domino_single/id, strict rules: 0 successes" in shown
+    assert all(str(name) in out.out for name in {row.name for row in rollouts(kept, "random").attempts()})
+    assert cli.run(["show", f"pool={folder}", "to=sheet.html"]) == 2
+    assert "scengen show film" in capsys.readouterr().err
+    assert cli.run(["evaluate", "policy=idle", f"pool={folder}"]) == 2
+    assert "it is demonstrations (demonstrations.json)" in " ".join(capsys.readouterr().err.split())
+
+
 def test_kept_rollouts_say_their_policy_and_are_those_of_the_evaluation(kept):
     for policy, successes in (("oracle", 2), ("random", 0)):
         found, scenarios = rollouts(kept, policy), {id_ for (id_,) in Pool.open(REFERENCE).columns("id")}

@@ -236,7 +236,7 @@ def _decided(recording: Recording, reports: tuple[EpisodeReport, ...], decisions
     accepted = {k for k, decision in decisions.items() if decision.verdict == ACCEPT}
     rejected = {k for k, decision in decisions.items() if decision.verdict == REJECT}
     kept = sorted({*clean, *accepted} - rejected)
-    funnel = {"recorded": len(reports), "scored": len(scored), "without findings": len(clean), "kept": len(kept)}
+    funnel = {"recorded": len(reports), "scored": len(scored), "without errors": len(clean), "kept": len(kept)}
     return Curated(recording, reports, decisions, tuple(kept), funnel)
 
 
