@@ -165,14 +165,16 @@ def chosen_task(verb: str, overrides: Sequence[str]) -> str | None:
 
 
 def chosen_tasks(verb: str, overrides: Sequence[str]) -> list[str]:
-    """Names of the tasks that a command line chooses, for a command that accepts several: all if it chooses none.
+    """Names of the tasks that a command line chooses, each once, for a command that accepts several.
+
+    It chooses all if it names none.
 
     Raises:
         ScengenError: one line that says what is wrong.
     """
     named = [text for text in overrides if text.startswith("task=")] or [f"task={ALL}"]
     asked = combinations(verb, [*named, *search_path(overrides)])
-    return [name for one in asked if (name := chosen_task(verb, one.overrides))]
+    return list(dict.fromkeys(name for one in asked if (name := chosen_task(verb, one.overrides))))
 
 
 def config_dir(verb: str) -> Path:
@@ -379,7 +381,7 @@ def _check_override(verb: str, text: str) -> None:
     ):
         raise BadConfig(f"{quoted}: parts are joined by +; give {key}={'+'.join(map(str, value))}")
     if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
-        raise BadConfig(f"{quoted}: {_instead_of(key)}; hydra.searchpath is the only setting of Hydra for scengen")
+        raise BadConfig(f"{quoted}: leave it out; {_instead_of(key)}scengen accepts no setting of Hydra but hydra.searchpath")
     if override.is_delete() and (name := re.split("[./]", key)[0]) not in (known := _known(verb)):
         raise UnknownName(f"setting of {verb}", name, known)
     if override.is_delete() and not key.startswith("task."):
@@ -423,14 +425,15 @@ def _lists(verb: str) -> list[str]:
 
 
 def _instead_of(key: str) -> str:
-    """What to give instead of a setting of Hydra."""
+    """What to give instead of a setting of Hydra, with a semicolon; empty if nothing replaces it."""
     said = {
         "launcher": "workers=N uses the cores of this machine, executor=ray those of a cluster",
         "sweeper": "several values make a sweep, as in seed=1,2",
         "sweep": "several values make a sweep, as in seed=1,2, and pool= or to= names its folder",
         "run": "pool= or to= names the folder of the results",
     }
-    return said.get(re.split("[./]", key)[1] if re.search("[./]", key) else "", "leave it out")
+    instead = said.get(re.split("[./]", key)[1] if re.search("[./]", key) else "")
+    return f"{instead}; " if instead else ""
 
 
 def _known(verb: str) -> list[str]:

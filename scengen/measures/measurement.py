@@ -101,7 +101,7 @@ class Measurement:
     def chosen(self, task: Task) -> tuple[str, ...]:
         """Splits of a task to measure: the chosen ones that the task has, or all."""
         known = self.all_splits(task)
-        return tuple(split for split in self.splits if split in known) if self.splits else tuple(known)
+        return tuple(split for split in dict.fromkeys(self.splits) if split in known) if self.splits else tuple(known)
 
     def jobs(self, task: Task) -> Iterator[Job]:
         """All jobs of a task."""

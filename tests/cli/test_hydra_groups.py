@@ -112,6 +112,7 @@ def test_options_of_hydra_show_what_they_show_there(capsys):
 @pytest.mark.parametrize(
     ("word", "told"),
     [
+        ("hydra.job.name=x", "leave it out; scengen accepts no setting of Hydra but hydra.searchpath"),
         ("hydra.run.dir=x", "pool= or to= names the folder of the results"),
         ("hydra.sweep.dir=x", "several values make a sweep, as in seed=1,2, and pool= or to= names its folder"),
         ("hydra/launcher=joblib", "workers=N uses the cores of this machine, executor=ray those of a cluster"),

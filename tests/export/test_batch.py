@@ -113,7 +113,7 @@ def test_splits_of_a_task_share_a_batch(tmp_path):
         (["layout=9"], "layout = 9; give layout=1 (27 bodies, n = 2)"),
         (["layout=1", "robot=false"], "with format=batch the robot is in the scene"),
         (["format=mjb"], "no format named 'mjb'"),
-        (["layout=2", "format=mjcf"], "layout = 2; only format=batch has layouts"),
+        (["layout=2", "format=mjcf"], "layout = 2; only format=batch has layouts; leave it out"),
         ([f"pool={REFERENCE},{MIRROR}"], "one task, and the pools have domino_single, mirror_pick_place"),
         (["layout=1", f"to={REFERENCE}"], "is not empty: it holds manifest.json; delete it"),
     ],

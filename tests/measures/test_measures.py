@@ -42,6 +42,8 @@ def test_a_foreign_task_has_a_ledger_of_its_own_and_the_same_tables(tmp_path, co
     told = capsys.readouterr()
     assert "push_block/id: 3 of 4 certified" in told.out and "push_block/far: no twin is feasible" in told.err
     assert cli.run((*words, "splits=id")) == 0 and counted.count("id") == 1
+    assert cli.run((*words[:2], "task=push_block,push_block", *words[3:], "splits=[id,id]", "fresh=true")) == 0
+    assert counted.count("id") == 2, "what is named twice is measured once"
     assert "nothing is missing" in capsys.readouterr().out
     assert (tmp_path / "certified" / "push_block.jsonl").read_text().count("\n") == len(counted) - 1
     assert cli.run(("tasks", "task=push_block", f"records={tmp_path}", *SEARCH)) == 0

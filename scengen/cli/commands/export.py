@@ -42,7 +42,7 @@ class ExportSettings:
         if self.format == BATCH and not self.robot:
             raise BadConfig("robot = false; with format=batch the robot is in the scene, leave robot= out")
         if self.format == MJCF and self.layout is not None:
-            raise BadConfig(f"layout = {self.layout}; only format=batch has layouts")
+            raise BadConfig(f"layout = {self.layout}; only format=batch has layouts; leave it out")
 
 
 def command(arguments: Arguments) -> int:

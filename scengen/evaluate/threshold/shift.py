@@ -59,7 +59,7 @@ class Shift:
                 raise BadConfig(f"axis {along} of {task} has {count} severities; pass levels={MAX_LEVELS} or fewer")
             return cls(_with_severities(found, along, count), along, count)
         if along not in kinds():
-            raise UnknownName(f"along of {task}", along, [*found.axes, *kinds()])
+            raise UnknownName(f"axis or perturbation of {task}", along, [*found.axes, *kinds()])
         strengths = kinds()[along].strengths
         if levels not in (None, len(strengths)):
             raise BadConfig(f"levels = {levels}; perturbation {along} has {len(strengths)}: leave levels= out")
