@@ -381,7 +381,8 @@ def _check_override(verb: str, text: str) -> None:
     ):
         raise BadConfig(f"{quoted}: parts are joined by +; give {key}={'+'.join(map(str, value))}")
     if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
-        raise BadConfig(f"{quoted}: leave it out; {_instead_of(key)}scengen accepts no setting of Hydra but hydra.searchpath")
+        instead = _instead_of(key)
+        raise BadConfig(f"{quoted}: leave it out; {instead}scengen accepts no setting of Hydra but hydra.searchpath")
     if override.is_delete() and (name := re.split("[./]", key)[0]) not in (known := _known(verb)):
         raise UnknownName(f"setting of {verb}", name, known)
     if override.is_delete() and not key.startswith("task."):
