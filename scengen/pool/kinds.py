@@ -55,7 +55,7 @@ def check_there(folder: Path, mark: str, maker: str) -> None:
     if (folder / mark).is_file():
         return
     if others := marks(folder):
-        why = f"it is {MARKS[others[0]]} ({others[0]})"
+        why = f"it is {MARKS[others[0]]} ({others[0]}); name {MARKS[mark]}"
     elif Path(f"{folder}.run").is_dir():
         why = f"{mark} is missing; a run was started there; repeat its command to finish it"
     else:

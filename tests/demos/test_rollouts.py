@@ -45,7 +45,7 @@ def test_show_says_what_kept_rollouts_are(kept, capsys):
     assert cli.run(["show", f"pool={folder}", "to=sheet.html"]) == 2
     assert "scengen show film" in capsys.readouterr().err
     assert cli.run(["evaluate", "policy=idle", f"pool={folder}"]) == 2
-    assert "it is demonstrations (demonstrations.json)" in " ".join(capsys.readouterr().err.split())
+    assert "it is demonstrations (demonstrations.json); name a pool" in " ".join(capsys.readouterr().err.split())
 
 
 def test_kept_rollouts_say_their_policy_and_are_those_of_the_evaluation(kept):
