@@ -14,6 +14,7 @@ from ...evaluate.comparison import MAX_SHOWN, Comparison, PolicyResult
 from ...evaluate.edition import Edition, check_pool, chosen_sets, evaluation_pools
 from ...evaluate.policies import find_policy
 from ...evaluate.rollouts import Evaluation, evaluate
+from ...evaluate.rows import ShownTable
 from ...evaluate.scenarios import different_sizes
 from ...evaluate.settings import PROFILE, EvaluateSettings, other_version
 from ...pool import Pool
@@ -103,21 +104,48 @@ def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None],
 
 def _show(compared: Comparison, settings: EvaluateSettings) -> None:
     """Print the tables and the headlines."""
-    titles, cells, common = compared.table()
-    what = ", ".join([*([common["task"]] if "task" in common else []), *(one.name for one in settings.several())])
-    out.print(_table(f"{what}: success [%], {settings.rules} rules", titles, cells))
-    if "change" in titles:
-        say("change: to training, twin by twin if there are twins; under a condition, to the same clean episodes")
-    for title, head, rows in (
-        ("goal reached otherwise than by the means of the task", compared.way_head, [*compared.way_rows()]),
-        ("failures", compared.failure_head, [*compared.failure_rows()]),
+    told = list[str]()
+    for shown in compared.tables():
+        common = [shown.common[name] for name in ("task", "policy") if name in shown.common]
+        n = f", n = {shown.common['n']}" if "n" in shown.common else ""
+        by = "split and condition" if "condition" in shown.head else "split"
+        title = f"{', '.join(['success [%]', *common])} by {by}, {settings.rules} rules{n}"
+        table = _table(title, *_grouped(shown))
+        for column in table.columns[1:]:
+            column.no_wrap, column.justify = True, "right"
+        if told:
+            say("")
+        out.print(table)
+        for line in (line for line in shown.legend if line not in told):
+            say(line)
+        told += shown.legend
+    for title, (head, rows) in (
+        ("goal reached otherwise than by the means of the task", compared.way_table()),
+        ("failures", compared.failure_table()),
     ):
         if rows:
+            say("")
             out.print(_table(title, head, rows[:MAX_SHOWN]))
         if (more := len(rows) - MAX_SHOWN) > 0:
             say(f"{more} more lines are in table.md")
     for line in compared.headlines:
         say(line)
+
+
+def _grouped(shown: ShownTable) -> tuple[list[str], list[list[str]]]:
+    """Titles and cells with task, split and condition in one column, and below them a line for each policy if there are
+    several: names of policies and conditions are long, and a terminal may have 80 columns."""
+    places = [k for k, name in enumerate(shown.head) if name in ("task", "split", "condition")]
+    policy = shown.head.index("policy") if "policy" in shown.head else None
+    others = [k for k in range(len(shown.head)) if k not in (*places, policy)]
+    found, before = list[list[str]](), ""
+    for row in shown.cells:
+        where = ", ".join(row[k] for k in places)
+        if policy is not None and where != before:
+            found.append([where, *("" for _ in others)])
+        found.append([where if policy is None else f"  {row[policy]}", *(row[k] for k in others)])
+        before = where
+    return ["", *(shown.head[k] for k in others)], found
 
 
 def _table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
