@@ -94,7 +94,7 @@ class Take:
         if not self.perturbation:
             return name
         self.perturbation.check_perceived("a film replays what an arm has done; film a pool of generate perturb=")
-        self.perturbation.check((), [name or POLICY_CAMERA], self.look)
+        self.perturbation.check((), [name or POLICY_CAMERA], self.look, "camera={}")
         self.scenario.orientation.check_size(width, height)
         return name or POLICY_CAMERA
 

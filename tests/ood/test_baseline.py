@@ -3,8 +3,7 @@
 import pytest
 
 from scengen.errors import BadConfig
-from scengen.evaluate.statistics import paired, rate
-from scengen.evaluate.statistics import smallest_visible_drop
+from scengen.evaluate.statistics import paired, rate, smallest_visible_drop
 from scengen.ood.baseline import INCONCLUSIVE, MIN_TWINS, Baseline, verdict, verdict_of_twins
 
 
@@ -42,7 +41,6 @@ def test_too_few_twins_get_no_verdict_but_the_number_that_it_takes():
     assert verdict_of_twins([broken], MIN_TWINS) == "breaks motion memory"
     assert verdict_of_twins([broken], 6) == "none: n = 6 is too small, a verdict takes 10 twins or more"
     assert smallest_visible_drop(1.0, MIN_TWINS) == 0.5 < smallest_visible_drop(1.0, MIN_TWINS - 1)
-
 
 
 def test_an_axis_that_breaks_nothing_is_solved_by_the_first_kind_that_works_or_inconclusive():

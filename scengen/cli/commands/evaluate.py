@@ -1,6 +1,6 @@
 """measure the success rate of policies, in and out of distribution, with intervals"""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from rich.box import SIMPLE_HEAD
@@ -13,7 +13,7 @@ from ...evaluate.benign import benign_pools
 from ...evaluate.comparison import MAX_SHOWN, Comparison, PolicyResult
 from ...evaluate.edition import Edition, check_pool, chosen_sets, evaluation_pools
 from ...evaluate.policies import find_policy
-from ...evaluate.rollouts import Evaluation, evaluate
+from ...evaluate.rollouts import Evaluation, Progress, evaluate
 from ...evaluate.rows import ShownTable
 from ...evaluate.scenarios import different_sizes
 from ...evaluate.settings import PROFILE, EvaluateSettings, other_version
@@ -89,13 +89,17 @@ def _benign_pools(settings: EvaluateSettings, search: Sequence[str]) -> list[str
         )
 
 
-def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None], search: Sequence[str]) -> Evaluation:
+def _evaluated(settings: EvaluateSettings, progress: Progress, search: Sequence[str]) -> Evaluation:
     """Evaluate one policy, and keep its rollouts if that is requested."""
+
+    def announce(told: str) -> None:
+        warn(f"evaluate {settings.name}: {told}", "none")  # standard output would break the bar
+
     if not settings.keep:
-        return evaluate(settings, progress, search)
+        return evaluate(settings, progress, search, announce=announce)
     tasks = {pool.task: load_task(pool.task, search) for pool in map(Pool.open, settings.folders)}
     with Keeper(settings, tasks) as keeper:
-        found = evaluate(settings, progress, search, keeper)
+        found = evaluate(settings, progress, search, keeper, announce)
         for one in keeper.finish():
             many = sum(one.manifest.outcomes.values())
             say(f"kept {many} rollouts, {one.made} of them successes: {one.demonstrations.folder}")
