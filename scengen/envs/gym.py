@@ -62,7 +62,7 @@ from .observations import (
 from .pools import Folders, chosen, located, rows_of, scenes_drawn_otherwise
 
 Observation = dict[str, Reading]
-P = ParamSpec("P")
+Given = ParamSpec("Given")
 
 RENDER_MODES = ("rgb_array",)
 """Names of the render modes."""
@@ -119,12 +119,12 @@ class Drawing(NamedTuple):
     """Time that they took [s]."""
 
 
-def names_arguments(init: Callable[P, None]) -> Callable[P, None]:
+def names_arguments(init: Callable[Given, None]) -> Callable[Given, None]:
     """An `__init__` that refuses unknown keywords with the nearest known one."""
     known = [*inspect.signature(init).parameters][1:]
 
     @wraps(init)
-    def checked_init(*args: P.args, **named: P.kwargs) -> None:
+    def checked_init(*args: Given.args, **named: Given.kwargs) -> None:
         for name in named:
             if name not in known:
                 raise UnknownName("argument", name, known)
