@@ -122,7 +122,7 @@ def _counts(episodes: Sequence[Mapping[str, Any]], what: str, split: str) -> tup
 
 @dataclass(frozen=True)
 class ShownTable:
-    """A table of rows as people read it, without columns that tell nothing apart."""
+    """A table of rows as people read it, without columns that hold one value alone."""
 
     head: Sequence[str]
     """Titles of the columns in which rows differ."""
