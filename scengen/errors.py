@@ -29,10 +29,18 @@ class OutOfBounds(ScengenError):
 class UnknownName(ScengenError):
     """A requested name does not exist. The message lists the names that do."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]):
-        names = sorted(known)
-        close, listed = nearest(name, names), ", ".join(names) or "(none)"
-        super().__init__(f"no {kind} named {cut(repr(name))}{close}; known: {listed}")
+    def __init__(
+        self, kind: str, name: str, known: Iterable[str], meant: str | None = None, others: Iterable[str] = ()
+    ):
+        """
+        Args:
+            meant: the known name that is meant, if its spelling is far from the given one.
+            others: further unknown names.
+        """
+        names = sorted({*known})
+        close = f" (did you mean {meant!r}?)" if meant else nearest(name, names)
+        also = "".join(f", nor {cut(repr(other))}{nearest(other, names)}" for other in others)
+        super().__init__(f"no {kind} named {cut(repr(name))}{close}{also}; known: {', '.join(names) or '(none)'}")
 
 
 class Infeasible(ScengenError):

@@ -182,7 +182,7 @@ def _check_perturbation(settings: AgentSettings, row: PoolRow, search: Sequence[
         perturbation.check_perceived("only stage=3 acts; leave it out")
     given = streams(row.embodiment, settings.pictures)
     seen = [camera for name, camera in cameras.items() if name in given]
-    perturbation.check([name for name in given if name not in cameras], seen)
+    perturbation.check([name for name in given if name not in cameras], seen, setting="pictures=true")
     perturbation.check_words(Words.of(row.task, row.instruction, search))
 
 

@@ -77,10 +77,13 @@ def _rate_cells(rate: TierRate) -> list[str]:
 
 
 def pool_table(pool: Pool) -> Table:
-    """One line per scenario, at most `LINES`, with the parameters that differ between scenarios."""
+    """One line per scenario, at most `LINES`, with the parameters that differ between scenarios, or of one alone with
+    those that training draws."""
     rows = list(islice(zip(pool.names(), pool.columns("shifted", "params"), strict=True), LINES))
     every = [params for _, (_, params) in rows]
     drawn = [name for name in (every[0] if every else ()) if any(params[name] != every[0][name] for params in every)]
+    if len(every) == 1:
+        drawn = [*pool.manifest.task_node["id"]]
     table = Table(title=f"{pool.folder}: {pool.split}", title_justify="left")
     table.add_column("scenario", no_wrap=True)  # users copy names
     table.add_column("parameters")

@@ -20,7 +20,7 @@ from pathlib import Path
 from .. import compose
 from ..errors import Infeasible, ScengenError
 from ..ood import axis_card, axis_evidence, features
-from ..ood.baseline import BELIEF, INCONCLUSIVE
+from ..ood.baseline import BELIEF
 from ..params import canonical, values, with_values
 from ..samplers import task_files
 from ..samplers.split import ID
@@ -285,7 +285,8 @@ def _breaks(card: axis_card.AxisCard) -> None:
     weak = all(found.finding in ("too weak", "not tried") for found in card.baselines if found.name not in BELIEF)
     leaves = weak and any(departure.leaves for departure in card.features)
     findings = ", ".join(f"{found.name} {found.finding}" for found in card.baselines)
-    remedy = "try more twins" if card.verdict == INCONCLUSIVE else "say in its why what it demands of vision"
+    solved = card.verdict.startswith("solved")
+    remedy = "say in its why what it demands of vision" if solved else "try more twins"
     broken = card.verdict.startswith("breaks") or leaves
     _require(broken, f"{card.task}/{card.axis}: {card.verdict} ({findings}); {remedy}")
 

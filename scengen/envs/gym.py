@@ -8,6 +8,7 @@ An environment plays the certified scenarios of a pool, with the scene text, the
 certificate. Reset samples nothing: the seed selects one of the stored scenarios, and `info` holds its id.
 """
 
+import inspect
 import threading
 import time
 import warnings
@@ -15,8 +16,8 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
-from typing import Any, NamedTuple
+from functools import cache, cached_property, wraps
+from typing import Any, NamedTuple, ParamSpec
 
 import gymnasium
 import numpy as np
@@ -61,6 +62,7 @@ from .observations import (
 from .pools import Folders, chosen, located, rows_of, scenes_drawn_otherwise
 
 Observation = dict[str, Reading]
+Given = ParamSpec("Given")
 
 RENDER_MODES = ("rgb_array",)
 """Names of the render modes."""
@@ -117,6 +119,20 @@ class Drawing(NamedTuple):
     """Time that they took [s]."""
 
 
+def names_arguments(init: Callable[Given, None]) -> Callable[Given, None]:
+    """An `__init__` that refuses unknown keywords with the nearest known one."""
+    known = [*inspect.signature(init).parameters][1:]
+
+    @wraps(init)
+    def checked_init(*args: Given.args, **named: Given.kwargs) -> None:
+        for name in named:
+            if name not in known:
+                raise UnknownName("argument", name, known)
+        init(*args, **named)
+
+    return checked_init
+
+
 class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """The scenarios of one task in one or more pools.
 
@@ -146,6 +162,7 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     _spec: EnvSpec | None = None
     metadata = {"render_modes": [*RENDER_MODES], "render_fps": round(1 / Loop.PERIOD)}  # noqa: RUF012
 
+    @names_arguments
     def __init__(
         self,
         task: str,

@@ -240,12 +240,15 @@ def requested(names: str | Iterable[str] | None, embodiment: str) -> tuple[str, 
     return tuple(dict.fromkeys(each for name in given for each in words.get(name, (name,))))
 
 
+MEANT = dict.fromkeys(("image", "images", "camera", "cameras", "pixels", "rgb", "vision", "visual"), PICTURES)
+"""What words of other packages are called here."""
+
+
 def check_names(names: Sequence[str], embodiment: str, poses: Iterable[str]) -> None:
-    """Raise `UnknownName` for the first name that is neither a stream nor a camera of the robot, nor in `poses`."""
-    known = [*WORDS, *streams_of(embodiment), *cameras_of(embodiment), *poses]
-    for name in names:
-        if name not in known:
-            raise UnknownName("observation", name, known)
+    """Raise `UnknownName` for all names that are neither streams nor cameras of the robot, nor in `poses`."""
+    known = {*WORDS, *streams_of(embodiment), *cameras_of(embodiment), *poses}
+    if unknown := [name for name in names if name not in known]:
+        raise UnknownName("observation", unknown[0], known, MEANT.get(unknown[0]), unknown[1:])
 
 
 MOVES = ("move_x", "move_y", "move_z", "turn_x", "turn_y", "turn_z", "gripper")

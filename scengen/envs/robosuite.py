@@ -240,7 +240,7 @@ class RobosuiteEnv(ManipulationEnv):
         for width, height in zip(self.camera_widths, self.camera_heights, strict=True) if self.use_camera_obs else ():
             self.scenario.orientation.check_size(width, height)
         cameras = list(map(str, self.camera_names)) if self.use_camera_obs else []
-        self.perturbation.check(self._streams, cameras, PLAIN)
+        self.perturbation.check(self._streams, cameras, PLAIN, "use_camera_obs=True or use_object_obs=True")
         self.model = self._composed(self.row, self.perturbation.shows_spares)
 
     @property

@@ -18,9 +18,9 @@ from .edition import Edition
 from .latex import FILE, latex
 from .lines import CSV, as_csv
 from .rollouts import Evaluation
-from .rows import Row, rows, shown
+from .rows import Row, ShownTable, rows
 from .settings import LATEX, EvaluateSettings
-from .statistics import smallest_visible_drop
+from .statistics import scenarios_for_drop, smallest_visible_drop
 from .table import TableLine, distinct, otherwise, plain, table
 
 TABLE = "table.json"
@@ -116,12 +116,16 @@ class PolicyResult:
     def _visible(self) -> str:
         """The smallest drop that this number of scenarios can show."""
         first = next((row.rate for row in self.rows if row.split == ID), None)
-        if first is None or not any(row.change for row in self.rows):
+        if first is None or not any(row.difference for row in self.rows):
             return ""
-        least = smallest_visible_drop(first.value, first.scenarios)
-        what = f"{first.scenarios} scenarios show drops of"
-        return (
-            f"{what} {100 * least:.0f} points or more" if least else f"{first.scenarios} scenarios show no drop at all"
+        n, before = first.scenarios, f"{100 * first.value:.0f} %"
+        if not first.value:
+            return "nothing succeeds in training, so that no drop can show"
+        if least := smallest_visible_drop(first.value, n):
+            return f"{n} scenarios are enough to show drops of {100 * least:.0f} points or more from {before}"
+        enough = scenarios_for_drop(first.value)
+        return f"{n} scenarios are too few to show any drop from {before}" + (
+            f", even to 0; it takes {enough} or more" if enough else ""
         )
 
     @cached_property
@@ -168,7 +172,8 @@ class PolicyResult:
         against = (
             f"the same episodes without the axis ({drop.twins} twins)" if drop.twins else "other scenarios, unpaired"
         )
-        return f"{self.settings.name}: {100 * drop.value:+.1f} points [{low:+.1f}, {high:+.1f}] against {against}"
+        told = f"{100 * drop.value:+.1f} points [{low:+.1f}, {high:+.1f}] against {against}"
+        return f"{self.settings.name}: {told}: {'' if drop.is_significant else 'not '}significant"
 
     @property
     def plain(self) -> dict[str, Any]:
@@ -203,34 +208,26 @@ class Comparison:
     results: Sequence[PolicyResult]
     """Result of each policy."""
 
-    def table(self, digits: int = 0) -> tuple[list[str], list[list[str]], Mapping[str, str]]:
-        """The table: titles of the columns, rows of all policies, and what all rows have in common.
+    def tables(self, digits: int = 0) -> list[ShownTable]:
+        """The tables of splits and of conditions with the rows of all policies, without empty ones.
 
         Args:
             digits: number of digits after the point.
         """
-        return shown([row.cells(digits) for row in self.rows])
+        splits, conditions = ([row for row in self.rows if bool(row.condition) is own] for own in (False, True))
+        return [ShownTable.of(some, digits) for some in (splits, conditions) if some]
 
-    @property
-    def failure_head(self) -> list[str]:
-        """Titles of the columns of the failures."""
-        return [*self._if_several("policy"), "task", "split", "reason", "phase", "episodes"]
+    def failure_table(self) -> tuple[list[str], list[list[str]]]:
+        """Titles and cells of the failures of all policies, the most frequent first."""
+        every = sorted((each for result in self.results for each in result.failures), key=lambda each: -each.episodes)
+        cells = [[f.policy, f.task, f.split, f.reason, f.phase, str(f.episodes)] for f in every]
+        return self._told_apart(["policy", "task", "split", "reason", "phase", "episodes"], cells)
 
-    def failure_rows(self) -> Iterator[list[str]]:
-        """The cells of the failures of all policies, the most frequent first."""
-        every = [failure for result in self.results for failure in result.failures]
-        for f in sorted(every, key=lambda failure: -failure.episodes):
-            yield [*self._if_several(f.policy), f.task, f.split, f.reason, f.phase, str(f.episodes)]
-
-    @property
-    def way_head(self) -> list[str]:
-        """Titles of the columns of other ways to the goal."""
-        return [*self._if_several("policy"), "task", "split", "lacks", "episodes"]
-
-    def way_rows(self) -> Iterator[list[str]]:
-        """The cells of the other ways of all policies to the goal, the most frequent first."""
-        for w in sorted((way for result in self.results for way in result.ways), key=lambda way: -way.episodes):
-            yield [*self._if_several(w.policy), w.task, w.split, w.lacks, str(w.episodes)]
+    def way_table(self) -> tuple[list[str], list[list[str]]]:
+        """Titles and cells of the other ways of all policies to the goal, the most frequent first."""
+        every = sorted((way for result in self.results for way in result.ways), key=lambda way: -way.episodes)
+        cells = [[w.policy, w.task, w.split, w.lacks, str(w.episodes)] for w in every]
+        return self._told_apart(["policy", "task", "split", "lacks", "episodes"], cells)
 
     @property
     def headlines(self) -> list[str]:
@@ -276,22 +273,23 @@ class Comparison:
         if settings.edition:
             edition = edition_told(settings.edition)
             head += f", edition {edition['name']} (sha256 {edition['sha256'][:12]})"
-        titles, cells, common = self.table(1)
-        head += "".join(f", {name} {value}" for name, value in common.items() if name == "task")
-        parts = [head, _table(titles, cells)]
+        tables = self.tables(1)
+        head += "".join(f", {name} {value}" for name, value in tables[0].common.items() if name in ("task", "n"))
+        parts = [head]
+        for each in tables:
+            parts += [_table(each.head, each.cells), "; ".join(each.legend)]
         if self.headlines:
             parts.append("\n".join(f"* {_escaped(line)}" for line in self.headlines))
-        if rows := list(self.way_rows()):
-            parts.append(_table(self.way_head, rows))
-        if rows := list(self.failure_rows()):
-            parts.append(_table(self.failure_head, rows))
+        parts += [_table(titles, cells) for titles, cells in (self.way_table(), self.failure_table()) if cells]
         versions = {task: version for result in self.results for task, version in result.task_versions.items()}
         parts.append("Versions of the tasks: " + ", ".join(f"{task} {each}" for task, each in versions.items()) + ".")
-        return "\n\n".join(parts) + "\n"
+        return "\n\n".join(filter(None, parts)) + "\n"
 
-    def _if_several(self, cell: str) -> list[str]:
-        """A cell of a column that only a comparison of several policies has."""
-        return [cell] if len(self.results) > 1 else []
+    def _told_apart(self, head: Sequence[str], cells: Sequence[Sequence[str]]) -> tuple[list[str], list[list[str]]]:
+        """A table without the columns of policies and tasks if there is one alone."""
+        alone = {"policy": len(self.results) == 1, "task": len(self.category) == 1}
+        kept = [number for number, name in enumerate(head) if not alone.get(name)]
+        return [head[number] for number in kept], [[row[number] for number in kept] for row in cells]
 
 
 def edition_told(name: str) -> dict[str, str]:

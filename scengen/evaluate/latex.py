@@ -3,16 +3,18 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from ..samplers.split import ID
-from .rows import ALL_AXES, Row
-from .statistics import Rate
+from .rows import ALL_AXES, Row, count
+from .statistics import Difference, Rate
 
 FILE = "table.tex"
 """File with the tables."""
 SPECIAL = {"\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
 """Characters that LaTeX reads as commands, with their replacements; others get a backslash."""
 
-Rates = Mapping[tuple[str, str, str, str], Rate]
-"""Rates by policy, task or category, split and condition."""
+Rows = Mapping[tuple[str, str, str, str], Row]
+"""Rows by policy, task or category, split and condition."""
+STARS = "; *: differs significantly from training, or under a condition from the clean episodes (95 \\%)"
+"""End of the caption of a table with stars."""
 
 
 def latex(rows: Sequence[Row], category: Mapping[str, str]) -> str:
@@ -22,57 +24,62 @@ def latex(rows: Sequence[Row], category: Mapping[str, str]) -> str:
         rows: rows of all policies.
         category: category of each task.
     """
-    rates = {(row.policy, row.task, row.split, row.condition): row.rate for row in rows}
+    found = {(row.policy, row.task, row.split, row.condition): row for row in rows}
     policies = list(dict.fromkeys(row.policy for row in rows))
     groups = list(dict.fromkeys(category.values()))
-    grouped, of_tasks = _by_category(rates, policies, category), _by_task(rates, policies, category)
+    grouped, of_tasks = _by_category(found, policies, category), _by_task(found, policies, category)
     every = ["task", "split", "condition", "policy", "n", "success"]
     tables = [
         booktabs("Success in training by category [\\%]", ["policy", *groups, "all"], grouped),
-        booktabs("Success in and out of distribution [\\%]", ["task", *_twice(policies)], of_tasks),
-        booktabs("Success on every split and condition [\\%]", every, _every(rows)),
+        booktabs(f"Success in and out of distribution [\\%]{STARS}", ["task", *_twice(policies)], of_tasks),
+        booktabs(f"Success on every split and condition [\\%]{STARS}", every, _every(rows)),
     ]
     return "% needs \\usepackage{booktabs}; intervals are 95 %\n" + "\n".join(tables)
 
 
-def _by_category(rates: Rates, policies: Sequence[str], category: Mapping[str, str]) -> Iterator[list[str]]:
+def _by_category(rows: Rows, policies: Sequence[str], category: Mapping[str, str]) -> Iterator[list[str]]:
     """A row for each policy. A category of one task has the rate of that task."""
     names = list(dict.fromkeys(category.values()))
     members = {name: [task for task, own in category.items() if own == name] for name in names}
     keys = [members[name][0] if len(members[name]) == 1 else name for name in names]
     whole = keys[0] if len(keys) == 1 else "all"
     for policy in policies:
-        yield [policy, *(cell(rates.get((policy, key, ID, ""))) for key in (*keys, whole))]
+        yield [policy, *(_cell(rows.get((policy, key, ID, ""))) for key in (*keys, whole))]
 
 
-def _by_task(rates: Rates, policies: Sequence[str], category: Mapping[str, str]) -> Iterator[list[str]]:
+def _by_task(rows: Rows, policies: Sequence[str], category: Mapping[str, str]) -> Iterator[list[str]]:
     """A row for each task: of each policy the rates in training and over all axes."""
     for task in category:
         found = [task]
         for policy in policies:
-            splits = [split for p, what, split, condition in rates if (p, what, condition) == (policy, task, "")]
+            splits = [split for p, what, split, condition in rows if (p, what, condition) == (policy, task, "")]
             outside = [split for split in splits if split != ID]
             last = ALL_AXES if ALL_AXES in outside else outside[0] if outside else ""
-            found += [cell(rates.get((policy, task, split, ""))) for split in (ID, last)]
+            found += [_cell(rows.get((policy, task, split, ""))) for split in (ID, last)]
         yield found
 
 
 def _every(rows: Sequence[Row]) -> Iterator[list[str]]:
     for row in rows:
-        task, split, condition, policy, n, *_ = row.cells()
-        yield [task, split, condition or "clean", policy, n.replace("x", "$\\times$"), cell(row.rate)]
+        n = count(row.rate).replace("x", "$\\times$")
+        yield [row.task, row.split, row.condition or "clean", row.policy, n, _cell(row)]
 
 
 def _twice(policies: Sequence[str]) -> list[str]:
     return [f"{policy}, {side}" for policy in policies for side in ("ID", "OOD")]
 
 
-def cell(rate: Rate | None) -> str:
-    """A rate with its interval below the line, in percent, as LaTeX."""
+def _cell(row: Row | None) -> str:
+    return cell(row.rate, row.difference) if row else cell(None)
+
+
+def cell(rate: Rate | None, difference: Difference | None = None) -> str:
+    """A rate with its interval below the line, in percent, as LaTeX; a star if its difference is significant."""
     if rate is None:
         return "--"
     value, low, high = (100 * each for each in (rate.value, rate.low, rate.high))
-    return f"${value:.1f}_{{[{low:.0f},\\,{high:.0f}]}}$"
+    star = "^{*}" if difference and difference.is_significant else ""
+    return f"${value:.1f}{star}_{{[{low:.0f},\\,{high:.0f}]}}$"
 
 
 def booktabs(caption: str, head: Sequence[str], rows: Iterator[list[str]]) -> str:

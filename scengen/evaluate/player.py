@@ -88,6 +88,8 @@ class PolicyPlayer:
             threads: number of threads that step the slots; None for the available cores.
         """
         self.settings, self.search, self.strict, self.threads = settings, search, strict, threads
+        self.has_cameras = False
+        """Whether a policy that was described observes cameras."""
         self._running: tuple[tuple[str, str], PoolVectorEnv, list[Policy]] | None = None
 
     def __call__(self, batch: Sequence[RolloutId]) -> list[dict[str, Any]]:
@@ -192,6 +194,7 @@ class PolicyPlayer:
             _check_conditions(envs.envs[0], self.settings, self.search)
             who[task], names = self._identity(policies[0]), envs.envs[0].observed
             observed[task] = [*names.streams, *names.cameras]
+            self.has_cameras |= bool(names.cameras)
         return told
 
     def _identity(self, policy: Policy) -> Any:
@@ -230,8 +233,10 @@ class PolicyPlayer:
 def _check_conditions(env: PoolEnv, settings: EvaluateSettings, search: Sequence[str]) -> None:
     """Raise `ScengenError` if a condition cannot be played on a task: before any is, which may take hours."""
     row, seen = env._rows[0], env.observed
-    for perturbation in map(Perturbation.parse, settings.perturbations):
-        perturbation.check([*seen.streams], [*seen.cameras.values()], env.look)
+    chosen = [*map(Perturbation.parse, settings.perturbations)]
+    every = Perturbation(tuple(dict.fromkeys(part for one in chosen for part in one.parts)))
+    every.check([*seen.streams], [*seen.cameras.values()], env.look)
+    for perturbation in chosen:
         if perturbation.has_words:
             words = Words.of(row.task, row.instruction, search)
             perturbation.of(row.id, settings.perturb_seed, words=words).instruction  # noqa: B018  (it raises an error)

@@ -4,6 +4,7 @@ Episodes are kept in `<to>/episodes.jsonl` as they end, so that a run that was k
 """
 
 import itertools
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -24,7 +25,7 @@ from ..work.log import Log
 from ..work.machine import cores
 from ..work.parallel import each
 from ..work.targets import move_aside, try_folder
-from .arms import BENIGN, automatic_arms
+from .arms import BENIGN, CLEAN, automatic_arms
 from .lines import CHAIN, COLUMNS, FORMAT, RUN, chained, renewed, run_sha256
 from .player import PolicyPlayer, Spent, policy_seed
 from .scenarios import Scenarios, chosen, not_playable
@@ -32,6 +33,8 @@ from .settings import Condition, EvaluateSettings, RolloutId, T, completed
 
 Keep = Callable[[RolloutId, Actions], None]
 """Keeps the actions that the controller received in a rollout; called before the rollout counts as played."""
+Progress = Callable[[int, int, str], None]
+"""Called with the number of rollouts done, their total, and the name of the condition that is played."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +61,10 @@ class Evaluation:
 
 def evaluate(
     settings: EvaluateSettings,
-    progress: Callable[[int, int], None],
+    progress: Progress,
     search: Sequence[str] = (),
     keep: Keep = lambda which, actions: None,
+    announce: Callable[[str], None] = lambda told: None,
 ) -> Evaluation:
     """Play every rollout that was not played yet, and return all episodes.
 
@@ -68,9 +72,9 @@ def evaluate(
     of a policy are never mixed with new ones.
 
     Args:
-        progress: called with the number of rollouts done, and their total.
         search: overrides that add folders of other packages, see `task_files.search_path`.
         keep: called with the actions of every rollout that is played to its end, if episodes are kept.
+        announce: called with a line about what is going to be played.
 
     Raises:
         ScengenError: a pool, a policy or a setting is not valid.
@@ -83,8 +87,13 @@ def evaluate(
     if not (about := {key: told for key, told in about.items() if key[1] not in lost}):
         raise PoolError(f"no scenario can be played; see scengen verify: {'; '.join(lost.values())}")
     with opened(settings, identity(settings, pools), about, search, keep, progress) as run:
-        run.play(wanted(about, settings))
-        run.play(wanted(about, settings, arms := run.arms()))
+        first, expected = wanted(about, settings), wanted(about, settings, run.arms())
+        announce(run.planned(first | expected))
+        run.play(first, len(expected))
+        later = wanted(about, settings, arms := run.arms())
+        if later - expected:
+            announce(f"the policy reads the instruction: {run.planned(later - expected)}")
+        run.play(later)
         run.sort()
         pinned = {str(pool.folder): pool.sha256 for pool in fresh}
         return Evaluation(run.lines(), run.earlier, lost, arms, pinned, run.chain, spent=run.spent)
@@ -110,7 +119,7 @@ def opened(
     about: Scenarios,
     search: Sequence[str],
     keep: Keep,
-    progress: Callable[[int, int], None],
+    progress: Progress,
 ) -> "Iterator[Run]":
     """A run that plays rollouts into the folder of the settings, or continues there.
 
@@ -174,8 +183,8 @@ class Run(LineLog):
     """Plays the rollouts."""
     keep: Keep
     """Keeps their actions."""
-    progress: Callable[[int, int], None]
-    """Called with the number of rollouts done, and their total."""
+    progress: Progress
+    """Called with each rollout."""
     earlier: int = 0
     """Number of episodes that an earlier run played."""
     spent: Spent = field(default_factory=Spent)
@@ -183,15 +192,19 @@ class Run(LineLog):
     wanted: set[RolloutId] = field(default_factory=set)
     """All rollouts of the run."""
 
-    def play(self, some: set[RolloutId]) -> None:
-        """Play those rollouts that the log does not hold."""
+    def play(self, some: set[RolloutId], later: int = 0) -> None:
+        """Play those rollouts that the log does not hold.
+
+        Args:
+            later: number of rollouts that are expected after them, for the progress.
+        """
         if not some:
             return
         self.wanted |= some
         todo = sorted(some - set(map(id_of, self.log.records)))  # one task and perturbation after the other
-        done = len(some) - len(todo)
-        self.earlier += done
-        self.progress(done, len(some))
+        self.earlier += len(some) - len(todo)
+        done, total = len(self.wanted) - len(todo), len(self.wanted) + later
+        self.progress(done, total, _named(todo[0]) if todo else "")
         self.player.strict = not self.log.records
         for count, record in enumerate(_played(self.player, todo), done + 1):
             self.spent = self.spent.plus(record.pop("spent", Spent()))
@@ -199,7 +212,21 @@ class Run(LineLog):
             if played is not None:
                 self.keep(id_of(record), played)
             self.add(record)
-            self.progress(count, len(some))
+            self.progress(count, total, _named(id_of(record)))
+
+    def planned(self, some: set[RolloutId]) -> str:
+        """A line about rollouts: how many of each condition, how to leave out arms, and what is slow."""
+        ordered = sorted(some, key=lambda which: (which.arm != CLEAN, bool(which.condition), which.condition))
+        counts = ", ".join(f"{n} {name}" for name, n in Counter(map(_named, ordered)).items())
+        scenarios, earlier = len({which.scenario for which in some}), len(some & {*map(id_of, self.log.records)})
+        told = f"{len(some)} episodes of {scenarios} scenarios x {self.settings.rollouts}: {counts}"
+        automatic = self.settings.chosen_arms is None and any(which.arm != CLEAN for which in some)
+        remarks = {
+            f"{earlier} are from an earlier run": bool(earlier),
+            "arms=none leaves out the arms": automatic,
+            "pictures are slow without a graphics card, smaller width= and height= save time": self.player.has_cameras,
+        }
+        return "; ".join([told, *(remark for remark, holds in remarks.items() if holds)])
 
     def extend(self, settings: EvaluateSettings) -> None:
         """Go on with settings that name further pools, in which later rollouts are played."""
@@ -212,10 +239,10 @@ class Run(LineLog):
         return [line for line in self.log.records if id_of(line) in self.wanted]
 
     def arms(self) -> list[str]:
-        """The chosen arms; by default those of the inputs that the policy has."""
+        """The chosen arms; by default those of the inputs that the policy is known to have."""
         if self.settings.chosen_arms is not None:
             return self.settings.chosen_arms
-        return automatic_arms(self.lines())
+        return automatic_arms([{"pictures": self.player.has_cameras, "instruction_read": False}, *self.lines()])
 
 
 @cache
@@ -248,6 +275,11 @@ def order(line: Mapping[str, Any]) -> tuple[Any, ...]:
     condition = Condition(line["perturbation"], line["arm"])
     where = line["split"] != ID, line["split"], line["pool"], line["index"], line["scenario"], line["rollout"]
     return line["task"], bool(condition), condition, *where
+
+
+def _named(which: RolloutId) -> str:
+    """Name of the condition of a rollout, for people."""
+    return f"arm {which.arm}" if which.arm != CLEAN else str(which.condition) or CLEAN
 
 
 def _played(player: PolicyPlayer, todo: Sequence[RolloutId]) -> Iterator[dict[str, Any]]:

@@ -11,10 +11,26 @@ from .table import TableLine, otherwise, percent
 
 ALL_AXES = "all axes"
 """Split of a row with the mean over several axes."""
-HEAD = ("task", "split", "condition", "policy", "n", "success", "change", "crashed", "otherwise")
-"""Titles of the columns. Those in which all rows agree are left out, see `shown`."""
-DROPPED = {"task": None, "condition": "", "policy": None, "change": "", "crashed": "0", "otherwise": "0"}
-"""Columns that are left out if all rows hold this value, or any one value for None."""
+COUNTS = ("crashed", "otherwise")
+"""Titles of the columns with numbers of episodes that end in another way."""
+SPLITS = ("task", "split", "policy", "n", "success", "to training", *COUNTS)
+"""Titles of the columns of the table of splits."""
+CONDITIONS = ("task", "split", "condition", "policy", "n", "success", "to clean", *COUNTS)
+"""Titles of the columns of the table of conditions."""
+ALIKE = ("task", "policy", "n")
+"""Columns that are left out if all rows hold the same value."""
+EMPTY = ("", "0")
+"""Values of other columns that are left out if all rows hold one of them."""
+SIGNIFICANT = "*"
+"""Mark behind the value of a change whose interval excludes 0."""
+LEGEND = {
+    "success": "n: scenarios x rollouts; in brackets: 95 % intervals",
+    "to training": "to training: change from training, twin by twin if there are twins",
+    "to clean": "to clean: change from the same split without perturbation and arm",
+    SIGNIFICANT: "*: significant, the 95 % interval of this change excludes 0",
+    "otherwise": "otherwise: episodes that reached the goal, but lack a means of the task (listed below)",
+}
+"""Meanings of titles and marks."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +47,7 @@ class Row:
     """Name of the policy."""
     rate: Rate
     """Success rate."""
-    change: Difference | None
+    difference: Difference | None
     """Difference to training, or under a condition to the clean episodes."""
     crashed: int = 0
     """Number of episodes in which the policy crashed. They are in no rate."""
@@ -44,10 +60,23 @@ class Row:
         Args:
             digits: number of digits after the point.
         """
-        change = percent(self.change, "+", digits) if self.change else ""
-        counts = (str(self.crashed), str(self.otherwise))
-        words = (self.task, self.split, self.condition, self.policy)
-        return [*words, count(self.rate), percent(self.rate, "", digits), change, *counts]
+        words = (self.task, self.split, *([self.condition] if self.condition else []), self.policy)
+        return [
+            *words,
+            count(self.rate),
+            percent(self.rate, "", digits),
+            change(self.difference, digits),
+            str(self.crashed),
+            str(self.otherwise),
+        ]
+
+
+def change(difference: Difference | None, digits: int = 0) -> str:
+    """A difference in points with its interval, marked if it is significant; empty for None."""
+    if difference is None:
+        return ""
+    value, gap, interval = percent(difference, "+", digits).partition(" ")
+    return f"{value}{SIGNIFICANT if difference.is_significant else ''}{gap}{interval}"
 
 
 def count(rate: Rate) -> str:
@@ -91,12 +120,36 @@ def _counts(episodes: Sequence[Mapping[str, Any]], what: str, split: str) -> tup
     return sum(bool(e.get("crashed")) for e in own), sum(map(otherwise, own))
 
 
-def shown(cells: Sequence[Sequence[str]]) -> tuple[list[str], list[list[str]], Mapping[str, str]]:
-    """Columns in which rows differ: their titles, the cells, and what the others hold in all rows."""
-    told: dict[str, str] = {}
-    for number, name in enumerate(HEAD):
-        values = {row[number] for row in cells}
-        if name in DROPPED and len(values) == 1 and DROPPED[name] in (None, *values):
-            told[name] = next(iter(values))
-    kept = [number for number, name in enumerate(HEAD) if name not in told]
-    return [HEAD[number] for number in kept], [[row[number] for number in kept] for row in cells], told
+@dataclass(frozen=True)
+class ShownTable:
+    """A table of rows as people read it, without columns that hold one value alone."""
+
+    head: Sequence[str]
+    """Titles of the columns in which rows differ."""
+    cells: Sequence[Sequence[str]]
+    """Cells of each row."""
+    common: Mapping[str, str]
+    """Values of the other columns, by title."""
+
+    @classmethod
+    def of(cls, rows: Sequence[Row], digits: int = 0) -> "ShownTable":
+        """The table of rows that are all about splits, or all about conditions.
+
+        Args:
+            digits: number of digits after the point.
+        """
+        head, cells = CONDITIONS if rows and rows[0].condition else SPLITS, [row.cells(digits) for row in rows]
+        values = {name: {row[number] for row in cells} for number, name in enumerate(head)}
+        common = {
+            name: next(iter(some))
+            for name, some in values.items()
+            if len(some) == 1 and (name in ALIKE or some <= {*EMPTY})
+        }
+        kept = [number for number, name in enumerate(head) if name not in common]
+        return cls([head[number] for number in kept], [[row[number] for number in kept] for row in cells], common)
+
+    @property
+    def legend(self) -> list[str]:
+        """Lines that explain its titles and marks."""
+        is_marked = any(SIGNIFICANT in cell for row in self.cells for cell in row)  # no name has a star
+        return [line for name, line in LEGEND.items() if name in self.head or (name == SIGNIFICANT and is_marked)]

@@ -52,6 +52,11 @@ class Difference:
     twins: int = 0
     """Number of pairs of twins; 0 if the two sides are unpaired."""
 
+    @property
+    def is_significant(self) -> bool:
+        """Whether the interval excludes 0."""
+        return self.low > 0 or self.high < 0
+
 
 def rate(successes: Sequence[Sequence[bool]], confidence: float = CONFIDENCE) -> Rate:
     """The success rate of several scenarios with one or more rollouts each: the mean over scenarios of their shares.
@@ -130,6 +135,16 @@ def smallest_visible_drop(before: float, scenarios: int) -> float | None:
         middle = (low + high) // 2
         low, high = (low, middle) if is_seen(middle) else (middle, high)
     return high / scenarios
+
+
+def scenarios_for_drop(before: float, most: int = CACHED_SCENARIOS) -> int | None:
+    """Smallest number of scenarios that can show a drop to 0; None if `most` are too few.
+
+    Args:
+        before: success rate before the drop.
+        most: largest number of scenarios that is tried.
+    """
+    return next((n for n in range(2, most + 1) if smallest_visible_drop(before, n)), None)
 
 
 def paired(a: Sequence[Sequence[bool]], b: Sequence[Sequence[bool]], confidence: float = CONFIDENCE) -> Difference:

@@ -208,7 +208,7 @@ def record(settings: RecordSettings, progress: Callable[[int, int], None], searc
     bodies = (bodies_of(task, scenes_of(pools, name)) for name, task in tasks.items())
     recorded = recorded_streams(robot, list(tasks.values()), bodies, settings.observed, settings.privileged)
     views = [cameras_of(robot)[name] for name in settings.camera_names]
-    settings.perturbation.check([*recorded.streams], views, settings.shown or ROOM)
+    settings.perturbation.check([*recorded.streams], views, settings.shown or ROOM, "{} in cameras= or observations=")
     for name, task in tasks.items():
         settings.perturbation.check_words(Words.of(name, task.instruction, search))
     source = _source(settings, [pool.sha256 for pool in pools], {name: task.version for name, task in tasks.items()})

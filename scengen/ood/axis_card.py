@@ -82,7 +82,7 @@ class AxisCard:
     first_draws: int
     """Number of indices whose first draw was certified."""
     verdict: str
-    """Verdict on the axis, see `baseline.verdict`."""
+    """Verdict on the axis, see `baseline.verdict_of_twins`."""
     baselines: list[Baseline]
     """Results of the memories, then those of the planners with beliefs from training."""
     oracle: Rate | None

@@ -19,7 +19,7 @@ from .analysis.distance import energy as energy_distance
 from .analysis.space import Space, of_features, of_parameters
 from .axis_card import NOT_SEARCHED, AxisCard, AxisSettings
 from .axis_card_page import write_page
-from .baseline import verdict
+from .baseline import verdict_of_twins
 from .belief import measure_belief
 
 LOGS = ("twins.jsonl", "any.jsonl", "beliefs.jsonl", "boundary.jsonl")
@@ -85,7 +85,7 @@ def _card(
         reasons=made.reasons if made else {},
         indices=made.indices if made else 0,
         first_draws=made.first_draws if made else 0,
-        verdict=verdict(baselines),
+        verdict=verdict_of_twins(baselines, settings.n),
         baselines=baselines,
         oracle=oracle,
         boundaries=boundaries,

@@ -27,6 +27,9 @@ SOLVED_SHARE = 0.5
 """An axis counts as solved by a baseline if the interval of its success lies above this share."""
 INCONCLUSIVE = "inconclusive"
 """Verdict: no baseline is known to break, and none is known to solve most of the axis."""
+MIN_TWINS = 10
+"""Minimum number of twins for a verdict. From it on, a baseline that solves all of its control and half of the twins is
+known to break."""
 COUNTS = ("twins", "training", "here", "both")
 """Counts of a record: twins, those solved in the control, those solved in the OOD twin, and those solved in both."""
 
@@ -109,6 +112,13 @@ class Baseline:
         if min(arms.values()) < 0:
             raise BadConfig(f"record of {name}: {training} and {here} of {n}, {both} in both, is impossible")
         return cls.of(name, control, [arm for arm, count in arms.items() for _ in range(count)], own)
+
+
+def verdict_of_twins(baselines: Iterable[Baseline], n: int) -> str:
+    """The verdict from `n` twins, or how many it takes if they are too few."""
+    if n >= MIN_TWINS:
+        return verdict(baselines)
+    return f"none: n = {n} is too small, a verdict takes {MIN_TWINS} twins or more"
 
 
 def verdict(baselines: Iterable[Baseline]) -> str:

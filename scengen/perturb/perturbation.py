@@ -16,12 +16,21 @@ from ..samplers import conditions
 from ..scenario import Conditions
 from .distractors import with_spares
 from .drawn import Drawn, Senses, random
-from .effects import CONTROL, LANGUAGE, PICTURES
+from .effects import CONTROL, EVERY, FIXED, LANGUAGE, OBJECTS, PICTURES, PROPRIOCEPTION, WRENCH, WRIST
 from .kinds import LEVELS, affects, kind_of, kinds, stream_kind
 from .language import WORDINGS, Words
 
 NONE = "none"
 """Name of no perturbation."""
+EXAMPLES = {
+    EVERY: "rgb_exo_right_cam",
+    FIXED: "rgb_exo_right_cam",
+    WRIST: "rgb_gripper_cam",
+    PROPRIOCEPTION: "robot0_eef_pos",
+    WRENCH: "force_torque",
+    OBJECTS: "object-state",
+}
+"""A camera or a stream that kinds affect, by what they affect."""
 
 
 @dataclass(frozen=True)
@@ -100,14 +109,22 @@ class Perturbation:
         """A look of a scene that is to be perturbed: with spare geoms if a part shows them."""
         return with_spares(look) if self.shows_spares else look
 
-    def check(self, streams: Sequence[str], cameras: Sequence[str], look: Look = ROOM) -> None:
-        """Raise `BadConfig` if a part affects nothing that is observed. Instruction and control always count.
+    def check(
+        self,
+        streams: Sequence[str],
+        cameras: Sequence[str],
+        look: Look = ROOM,
+        setting: str = "observations=[state,{}]",
+    ) -> None:
+        """Raise `BadConfig` if parts affect nothing that is observed. Instruction and control always count.
 
         Args:
             streams: names of the observed streams.
             cameras: robosuite's names of the observed cameras.
             look: look of the pictures.
+            setting: the setting that adds a stream or a camera, with `{}` for its name.
         """
+        lacking, added = list[str](), dict[str, str]()
         for name, level in self.parts:
             effect = kinds()[name].effect
             if effect.reads in (LANGUAGE, CONTROL):
@@ -118,14 +135,14 @@ class Perturbation:
                 )
             if effect.reads == PICTURES:
                 seen = [camera for camera in cameras if affects(effect, camera)]
-                what = (
-                    f"{effect.cameras}, and none is observed: observe one, such as rgb_exo_right_cam or rgb_gripper_cam"
-                )
             else:
                 seen = [stream for stream in streams if stream_kind(stream) == effect.reads]
-                what = f"streams of {effect.reads}, and none is observed: observe one"
             if not seen:
-                raise BadConfig(f"perturb = {name}@{level} affects {what}")
+                what = effect.cameras if effect.reads == PICTURES else f"streams of {effect.reads}"
+                lacking.append(f"{name}@{level} affects {what}, and none is observed")
+                added[EXAMPLES[effect.cameras if effect.reads == PICTURES else effect.reads]] = ""
+        if lacking:
+            raise BadConfig(f"perturb = {'; '.join(lacking)}: add one, such as {setting.format(','.join(added))}")
 
     def senses(
         self, model: mujoco.MjModel, scenario: str, task: str, instruction: str, seed: int, search: Sequence[str] = ()

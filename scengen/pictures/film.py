@@ -94,7 +94,7 @@ class Take:
         if not self.perturbation:
             return name
         self.perturbation.check_perceived("a film replays what an arm has done; film a pool of generate perturb=")
-        self.perturbation.check((), [name or POLICY_CAMERA], self.look)
+        self.perturbation.check((), [name or POLICY_CAMERA], self.look, "camera={}")
         self.scenario.orientation.check_size(width, height)
         return name or POLICY_CAMERA
 
@@ -124,17 +124,20 @@ class Take:
     def ways(self) -> list["Way"]:
         """When each mean of the task was decided, as a replay of the actions shows."""
         episode = Episode(self.scenario, World.load(self.scene_xml, self.embodiment), rules=self.rules)
-        at = dict[str, tuple[float, float]]()
+        at, end = dict[str, tuple[float, float]](), self.seconds
         for number, action in enumerate(self.actions, 1):
-            if episode.step(action) not in (None, "success"):
+            if (outcome := episode.step(action)) not in (None, "success"):
                 break
+            if outcome == "success":
+                end = min(end, number * Loop.PERIOD)
             new = {
                 name: (found, number * Loop.PERIOD) for name, found in episode.means.found().items() if found != OPEN
             }
             at = new | at
         lasting = {name for name, mean in episode.means.means.items() if mean.lasting and name not in at}
         return [
-            Way(name, *at.get(name, (SHOWN if name in lasting else OPEN, self.seconds))) for name in episode.means.means
+            Way(name, *at.get(name, (SHOWN, end) if name in lasting else (OPEN, self.seconds)))
+            for name in episode.means.means
         ]
 
     def even(self, count: int) -> list[int]:
@@ -150,7 +153,7 @@ class Way:
     found: float
     """Whether it was `SHOWN` or `MISSED`, or is still `OPEN` at the end."""
     seconds: float
-    """Time at which that was decided [s]; the end if it was true throughout, or is open."""
+    """Time at which that was decided [s]: of a mean that held throughout the success, of one that is open the end."""
 
     def __str__(self) -> str:
         mark, word = {SHOWN: ("+", "by"), MISSED: ("-", "missed at"), OPEN: ("-", "not shown by")}[self.found]

@@ -54,6 +54,15 @@ def test_no_word_of_a_table_is_clipped_or_broken(wide):
         assert not lost and not any("…" in line for line in lines), lost
 
 
+def test_a_pool_of_one_scenario_shows_the_parameters_that_training_draws(monkeypatch):
+    monkeypatch.setattr(tables, "LINES", 1)
+    pool = Pool.open(REFERENCE)
+    ((cell,),) = ([*column.cells] for column in tables.pool_table(pool).columns[1:])
+    assert [part.partition("=")[0] for part in cell.split(", ")] == [
+        name for name in pool.at(0).params if name in pool.manifest.task_node["id"]
+    ]
+
+
 def test_a_table_that_fits_stays_one_and_a_wide_one_becomes_blocks():
     table = Table("name", "value", title="two")
     table.columns[0].no_wrap = True

@@ -325,6 +325,17 @@ def test_what_is_no_action_never_reaches_the_simulator(env, action):
             "did you mean 'robot0_eef_pos'",
         ),
         (
+            lambda: PoolEnv("domino_single", REFERENCE, ["robot0_eef_poss", "image", "xyz"]),
+            UnknownName,
+            "(did you mean 'robot0_eef_pos'?), nor 'image', nor 'xyz'; known: force_torque, ",
+        ),
+        (lambda: PoolEnv("domino_single", REFERENCE, "image"), UnknownName, "did you mean 'pictures'"),
+        (
+            lambda: gymnasium.make("scengen/domino_single-v2", pol=REFERENCE),
+            UnknownName,
+            "no argument named 'pol' (did you mean 'pool'?)",
+        ),
+        (
             lambda: PoolEnv("domino_single", REFERENCE, render_mode="human"),
             UnknownName,
             "known: rgb_array",

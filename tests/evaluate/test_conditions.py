@@ -90,13 +90,43 @@ def test_each_rate_is_in_one_row_with_its_number():
         rows = result(played).rows
         assert list(dict.fromkeys(row.task for row in rows)) == [*tasks, *means]
         keys = [(row.task, row.split, row.condition) for row in rows]
-        assert len({*keys}) == len(keys) and {row.cells()[4] for row in rows} <= {"10 x 1", "20 x 1", "30 x 1"}
-    head, shown, common = Comparison([result(cells(9) + cells(4, split="far"))]).table()
-    assert head == ["split", "n", "success", "change"] and common["task"] == "a"
-    assert [row[:2] for row in shown] == [["id", "10 x 1"], ["far", "10 x 1"]] and shown[1][3].startswith("-50 [")
-    assert any(
-        "mine: 10 scenarios show drops of" in line for line in result(cells(9) + cells(4, split="far")).sentences
-    )
+        assert len({*keys}) == len(keys) and {row.cells()[3] for row in rows} <= {"10 x 1", "20 x 1", "30 x 1"}
+    (shown,) = Comparison([result(cells(9) + cells(4, split="far"))]).tables()
+    assert shown.head == ["split", "success", "to training"] and shown.common["task"] == "a"
+    assert shown.common["n"] == "10 x 1" and [row[0] for row in shown.cells] == ["id", "far"]
+    assert {row.cells()[3] for row in result(cells(9) + cells(4, split="far")).rows} == {"10 x 1"}
+
+
+@pytest.mark.parametrize(("solved", "star"), [(0, "*"), (8, ""), (10, "")])
+def test_a_change_is_marked_exactly_if_its_interval_excludes_0(solved, star):
+    """In the tables for people and in LaTeX, with a line that explains the mark."""
+    compared = Comparison([result([*cells(10), *cells(solved, split="far"), *cells(solved, perturbation="noise@1")])])
+    splits, conditions = compared.tables()
+    assert splits.head[-1] == "to training" and conditions.head[-1] == "to clean", "a title for each meaning"
+    for shown, row in ((splits, 1), (conditions, 0)):
+        assert shown.cells[row][-1].startswith(f"{10 * solved - 100:+d}{star} [")
+        assert any("excludes 0" in line for line in shown.legend) == bool(star)
+        assert any(line.startswith(f"{shown.head[-1]}: ") for line in shown.legend)
+    assert latex(compared.rows, compared.category).count("^{*}") == (3 if star else 0)
+    assert compared.results[0].headline.endswith(": significant" if star else ": not significant")
+
+
+@pytest.mark.parametrize(
+    ("n", "before", "says"),
+    [
+        (10, 9, "10 scenarios are enough to show drops of 50 points or more from 90 %"),
+        (6, 2, "6 scenarios are too few to show any drop from 33 %, even to 0; it takes 14 or more"),
+        (6, 0, "nothing succeeds in training, so that no drop can show"),
+    ],
+)
+def test_the_output_says_which_drops_its_scenarios_can_show(n, before, says):
+    assert f"mine: {says}" in result([*cells(before, n), *cells(0, n, split="far")]).sentences
+
+
+def test_episodes_that_reach_the_goal_otherwise_have_a_line_that_says_so():
+    (shown,) = Comparison([result([*cells(9), episode(index=10, success=False, lacks="a bridge")])]).tables()
+    assert shown.head[-1] == "otherwise" and shown.cells[0][-1] == "1"
+    assert "otherwise: episodes that reached the goal, but lack a means of the task (listed below)" in shown.legend
 
 
 def test_conditions_are_compared_with_the_same_clean_episodes():

@@ -77,6 +77,20 @@ def played(policy, to, **changes):
     return [{k: v for k, v in line.items() if k not in CHANGED} for line in found.episodes], found.spent
 
 
+def test_the_plan_and_the_progress_name_every_condition(lines, tmp_path):
+    """Before the first episode, with the arm that pictures bring along; and one total for all of them."""
+    given = {"pool": POOL, "seeds": 1, "rollouts": 1, "to": str(tmp_path / "told"), **SMALL, "look": "room"}
+    told, shown = list[str](), list[tuple[int, int, str]]()
+    settings = EvaluateSettings(policy="eyes:Often", perturb="noise@1", **given)
+    evaluate(settings, lambda *now: shown.append(now) if told else None, announce=told.append)
+    (plan,) = told
+    assert plan.startswith("3 episodes of 1 scenarios x 1: 1 clean, 1 noise@1, 1 arm blind; arms=none leaves out")
+    assert {total for _, total, _ in shown} == {3} and shown[-1] == (3, 3, "arm blind")
+    assert {name for *_, name in shown} == {"clean", "noise@1", "arm blind"}
+    evaluate(EvaluateSettings(policy="eyes:Often", arms="none", **given), lambda *_: None, announce=told.append)
+    assert told[1].startswith("1 episodes of 1 scenarios x 1: 1 clean; 1 are from an earlier run; pictures are slow")
+
+
 @pytest.mark.parametrize("slots", [1, 2])
 def test_a_policy_that_says_when_it_looks_plays_the_same_with_fewer_pictures(lines, slots):
     often, every = lines("Often", slots=slots)

@@ -271,7 +271,8 @@ def test_several_policies_stand_in_one_table(tmp_path, capsys, monkeypatch):
     told = json.loads((tmp_path / "out" / "table.json").read_text())["policies"]
     assert [(each["policy"], each["table"][-1]["id"]["value"]) for each in told] == [("idle", 0.0), ("oracle", 1.0)]
     lines = (tmp_path / "out" / "table.md").read_text().splitlines()
-    assert "task domino_single" in lines[0] and "| id | idle | 2 x 1 |" in lines[4] and "| id | oracle |" in lines[5]
+    assert lines[0].endswith("task domino_single, n 2 x 1")
+    assert "| id | idle | 0.0 [" in lines[4] and "| id | oracle | 100.0 [" in lines[5]
     (failure,) = told[0]["failures"]
     assert failure["episodes"] == 2 and failure["phase"] == "before contact" and "not reached" in failure["reason"]
     assert told[1]["failures"] == []
@@ -383,6 +384,6 @@ def test_the_headline_compares_the_same_episodes():
     episodes = [episode("id", k, True) for k in range(4)] + [episode("far", k, k < 1) for k in range(4)]
     result = PolicyResult(EvaluateSettings(policy="mine"), Evaluation(episodes, 0, {}))
     assert result.headline.startswith("mine: -75.0 points [")
-    assert result.headline.endswith("against the same episodes without the axis (4 twins)")
+    assert result.headline.endswith("against the same episodes without the axis (4 twins): not significant")
     alone = PolicyResult(EvaluateSettings(policy="mine"), Evaluation(episodes[:4], 0, {}))
     assert alone.headline == ""

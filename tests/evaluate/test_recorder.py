@@ -54,7 +54,7 @@ def test_lines_are_sorted_numbered_and_verify(results, capsys):
     assert cli.run(["verify", f"results={results}", "level=full"]) == 0
     out = capsys.readouterr().out
     assert "3 of 3 lines rebuilt" in out and "that a harness played no other episodes" in out
-    assert "| id | 3 of 2 |" in (results / "table.md").read_text()
+    assert ", n 3 of 2\n" in (results / "table.md").read_text()
 
 
 def test_they_are_the_lines_of_an_evaluation_but_for_the_policy(results, tmp_path):
@@ -87,7 +87,7 @@ def test_a_perturbed_run_without_a_clean_one_has_its_row(tmp_path):
     recorder = Recorder(tmp_path / "out", WHO, own)
     played(recorder, own, 0)
     recorder.close()
-    assert "proprioception_noise@2 | 1 x 1 |" in (tmp_path / "out" / "table.md").read_text()
+    assert "| id | proprioception_noise@2 | 0.0 [" in (tmp_path / "out" / "table.md").read_text()
     assert cli.run(["verify", f"results={tmp_path / 'out'}"]) == 0
 
 

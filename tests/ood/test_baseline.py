@@ -3,8 +3,8 @@
 import pytest
 
 from scengen.errors import BadConfig
-from scengen.evaluate.statistics import paired, rate
-from scengen.ood.baseline import INCONCLUSIVE, Baseline, verdict
+from scengen.evaluate.statistics import paired, rate, smallest_visible_drop
+from scengen.ood.baseline import INCONCLUSIVE, MIN_TWINS, Baseline, verdict, verdict_of_twins
 
 
 def baseline(name, training, here, own=1.0):
@@ -34,6 +34,13 @@ def test_the_verdict_names_every_kind_that_breaks_and_the_strongest_memory():
     assert verdict([intact, baseline("hidden_belief", 20, 3)]) == "breaks belief"
     learner = baseline("mip", 18, 1)
     assert verdict([learner, baseline("belief", 20, 3), broken]) == "breaks motion memory, belief, learner"
+
+
+def test_too_few_twins_get_no_verdict_but_the_number_that_it_takes():
+    broken = baseline("replay", 20, 0)
+    assert verdict_of_twins([broken], MIN_TWINS) == "breaks motion memory"
+    assert verdict_of_twins([broken], 6) == "none: n = 6 is too small, a verdict takes 10 twins or more"
+    assert smallest_visible_drop(1.0, MIN_TWINS) == 0.5 < smallest_visible_drop(1.0, MIN_TWINS - 1)
 
 
 def test_an_axis_that_breaks_nothing_is_solved_by_the_first_kind_that_works_or_inconclusive():

@@ -8,7 +8,9 @@ from helpers import REFERENCE
 from scengen import cli
 from scengen.attack import campaign
 from scengen.attack.experience import Experience
+from scengen.cli.commands.generate import _draws
 from scengen.errors import PoolError
+from scengen.pool import Pool
 from scengen.pool.manifest import MANIFEST
 from scengen.runs.journal import Journal, Record, begun, start_over
 
@@ -70,3 +72,10 @@ def test_an_attack_says_what_is_there_before_it_plays(tmp_path, monkeypatch, cap
     (tmp_path / "mine").mkdir()
     assert cli.run([*words[:-1], f"to={tmp_path / 'mine'}", "fresh=true"]) == 0
     assert not (tmp_path / "mine-1").exists(), "a folder without an attack stays where it is"
+
+
+def test_draws_ahead_of_a_pool_are_told_apart(tmp_path):
+    """Several workers finish more draws than a pool of n scenarios lists."""
+    listed = Pool.open(REFERENCE).manifest.indices
+    assert _draws(tmp_path, 7) == _draws(REFERENCE, listed) == "draws"
+    assert _draws(REFERENCE, listed + 1) == f"draws ({listed} of them in its pool)"

@@ -1,6 +1,6 @@
 """measure the success rate of policies, in and out of distribution, with intervals"""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from rich.box import SIMPLE_HEAD
@@ -13,7 +13,8 @@ from ...evaluate.benign import benign_pools
 from ...evaluate.comparison import MAX_SHOWN, Comparison, PolicyResult
 from ...evaluate.edition import Edition, check_pool, chosen_sets, evaluation_pools
 from ...evaluate.policies import find_policy
-from ...evaluate.rollouts import Evaluation, evaluate
+from ...evaluate.rollouts import Evaluation, Progress, evaluate
+from ...evaluate.rows import ShownTable
 from ...evaluate.scenarios import different_sizes
 from ...evaluate.settings import PROFILE, EvaluateSettings, other_version
 from ...pool import Pool
@@ -88,13 +89,17 @@ def _benign_pools(settings: EvaluateSettings, search: Sequence[str]) -> list[str
         )
 
 
-def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None], search: Sequence[str]) -> Evaluation:
+def _evaluated(settings: EvaluateSettings, progress: Progress, search: Sequence[str]) -> Evaluation:
     """Evaluate one policy, and keep its rollouts if that is requested."""
+
+    def announce(told: str) -> None:
+        warn(f"evaluate {settings.name}: {told}", "none")  # standard output would break the bar
+
     if not settings.keep:
-        return evaluate(settings, progress, search)
+        return evaluate(settings, progress, search, announce=announce)
     tasks = {pool.task: load_task(pool.task, search) for pool in map(Pool.open, settings.folders)}
     with Keeper(settings, tasks) as keeper:
-        found = evaluate(settings, progress, search, keeper)
+        found = evaluate(settings, progress, search, keeper, announce)
         for one in keeper.finish():
             many = sum(one.manifest.outcomes.values())
             say(f"kept {many} rollouts, {one.made} of them successes: {one.demonstrations.folder}")
@@ -103,21 +108,48 @@ def _evaluated(settings: EvaluateSettings, progress: Callable[[int, int], None],
 
 def _show(compared: Comparison, settings: EvaluateSettings) -> None:
     """Print the tables and the headlines."""
-    titles, cells, common = compared.table()
-    what = ", ".join([*([common["task"]] if "task" in common else []), *(one.name for one in settings.several())])
-    out.print(_table(f"{what}: success [%], {settings.rules} rules", titles, cells))
-    if "change" in titles:
-        say("change: to training, twin by twin if there are twins; under a condition, to the same clean episodes")
-    for title, head, rows in (
-        ("goal reached otherwise than by the means of the task", compared.way_head, [*compared.way_rows()]),
-        ("failures", compared.failure_head, [*compared.failure_rows()]),
+    told = list[str]()
+    for shown in compared.tables():
+        common = [shown.common[name] for name in ("task", "policy") if name in shown.common]
+        n = f", n = {shown.common['n']}" if "n" in shown.common else ""
+        by = "split and condition" if "condition" in shown.head else "split"
+        title = f"{', '.join(['success [%]', *common])} by {by}, {settings.rules} rules{n}"
+        table = _table(title, *_grouped(shown))
+        for column in table.columns[1:]:
+            column.no_wrap, column.justify = True, "right"
+        if told:
+            say("")
+        out.print(table)
+        for line in (line for line in shown.legend if line not in told):
+            say(line)
+        told += shown.legend
+    for title, (head, rows) in (
+        ("goal reached otherwise than by the means of the task", compared.way_table()),
+        ("failures", compared.failure_table()),
     ):
         if rows:
+            say("")
             out.print(_table(title, head, rows[:MAX_SHOWN]))
         if (more := len(rows) - MAX_SHOWN) > 0:
             say(f"{more} more lines are in table.md")
     for line in compared.headlines:
         say(line)
+
+
+def _grouped(shown: ShownTable) -> tuple[list[str], list[list[str]]]:
+    """Titles and cells with task, split and condition in one column, and below them a line for each policy if there are
+    several: names of policies and conditions are long, and a terminal may have 80 columns."""
+    places = [k for k, name in enumerate(shown.head) if name in ("task", "split", "condition")]
+    policy = shown.head.index("policy") if "policy" in shown.head else None
+    others = [k for k in range(len(shown.head)) if k not in (*places, policy)]
+    found, before = list[list[str]](), ""
+    for row in shown.cells:
+        where = ", ".join(row[k] for k in places)
+        if policy is not None and where != before:
+            found.append([where, *("" for _ in others)])
+        found.append([where if policy is None else f"  {row[policy]}", *(row[k] for k in others)])
+        before = where
+    return ["", *(shown.head[k] for k in others)], found
 
 
 def _table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:

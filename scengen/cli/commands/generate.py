@@ -61,7 +61,8 @@ class Run:
             what = f"in {settings.n} points of a Sobol set some pairs of parameters correlate by chance"
             warn(f"scengen: {what}, up to 0.95 at 32; give n={SOBOL} or more, or sampler=lhs:{settings.n}")
         _check_not_fewer(settings.folder(task), settings)
-        say_begun(begun(settings.folder(task)), "draws", settings.folder(task), settings.fresh)
+        folder = settings.folder(task)
+        say_begun(count := begun(folder), _draws(folder, count), folder, settings.fresh)
         rejections: Counter[str] = Counter()
         try:
             with ProgressBar(err, f"{task.name}/{settings.split}", settings.n, settings.workers) as progress_bar:
@@ -91,6 +92,12 @@ class Run:
                 "indices; see the reasons above, play one with scengen try, or raise limit="
             )
         return summary
+
+
+def _draws(folder: Path, count: int) -> str:
+    """What an earlier run has made. Several workers draw ahead of what the pool of a finished run needs."""
+    used = Pool.open(folder).manifest.indices if MANIFEST in marks(folder) else count
+    return "draws" if used == count else f"draws ({used} of them in its pool)"
 
 
 def _check_not_fewer(folder: Path, settings: GenerateSettings) -> None:

@@ -105,7 +105,7 @@ def find(
     fixed = [] if pools.is_drawn else pools.pools
     lost = not_playable(fixed, _within_reach(settings, pools), settings.workers) if fixed else {}
     depends = {**identity(settings, fixed), DESIGN: dict(settings.design)}
-    with opened(settings, depends, pools.about, search, keep, lambda done, total: None) as run:
+    with opened(settings, depends, pools.about, search, keep, lambda *_: None) as run:
         outcomes, played = dict[RolloutId, bool | None](), 0
         for some in Search(settings, pools, lost).rounds(outcomes):
             run.extend(with_levels(settings, pools))
