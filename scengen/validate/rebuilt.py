@@ -12,6 +12,7 @@ from ..errors import BadConfig, contrasted, cut
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.embodiment import JAW
+from ..sim.models import model_difference
 from ..sim.world import World
 from .impaired import posed
 
@@ -102,14 +103,8 @@ def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> s
     """
     if text == rebuilt:
         return ""
-    if not text or not rebuilt:
-        return f"{NOT_REBUILT}: {'it' if rebuilt else 'that'} is empty"
-    if "<?" in text:
-        return f"{NOT_REBUILT}: it has instructions for programs (<?...?>)"
-    try:
-        scene_text.check(text)
-    except BadConfig as error:
-        return f"{NOT_REBUILT}: {error}"
+    if why := _unreadable(text, rebuilt):
+        return why
     here, there = list(ET.fromstring(text).iter()), list(ET.fromstring(rebuilt).iter())
     for a, b in zip(here, there, strict=False):
         where = f"<{b.tag} {b.attrib.get('name', '')}>".replace(" >", ">")
@@ -127,6 +122,32 @@ def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> s
     if exact:
         return f"{NOT_REBUILT}: its text differs although its content does not"
     return _other_model(text, rebuilt, embodiment)
+
+
+def other_physics(text: str, rebuilt: str, embodiment: str = JAW) -> str:
+    """How the physics of a pool's scene differs from that of the rebuilt one, as text; empty if it does not.
+
+    Both are compiled by the MuJoCo of this process, which writes the same scene otherwise than the one of the pool.
+    """
+    if text == rebuilt:
+        return ""
+    if why := _unreadable(text, rebuilt) or _other_model(text, rebuilt, embodiment):
+        return why
+    why = model_difference(World.load(text, embodiment).model, World.load(rebuilt, embodiment).model)
+    return f"{NOT_REBUILT}: {why}" if why else ""
+
+
+def _unreadable(text: str, rebuilt: str) -> str:
+    """Reason why the scene of a pool is not read although it differs from the rebuilt one; empty if it is."""
+    if not text or not rebuilt:
+        return f"{NOT_REBUILT}: {'it' if rebuilt else 'that'} is empty"
+    if "<?" in text:
+        return f"{NOT_REBUILT}: it has instructions for programs (<?...?>)"
+    try:
+        scene_text.check(text)
+    except BadConfig as error:
+        return f"{NOT_REBUILT}: {error}"
+    return ""
 
 
 def _other_model(text: str, rebuilt: str, embodiment: str) -> str:
