@@ -32,7 +32,12 @@ class UnknownName(ScengenError):
     def __init__(self, kind: str, name: str, known: Iterable[str]):
         names = sorted(known)
         close, listed = nearest(name, names), ", ".join(names) or "(none)"
-        super().__init__(f"no {kind} named {cut(repr(name))}{close}; known: {listed}")
+        remedy = f"; {REMEDIES[kind]}" if kind in REMEDIES else ""
+        super().__init__(f"no {kind} named {cut(repr(name))}{close}; known: {listed}{remedy}")
+
+
+REMEDIES = {"task": "hydra.searchpath=FOLDER adds the folder that holds your task/NAME.yaml"}
+"""Remedies for unknown names, by kind."""
 
 
 class Infeasible(ScengenError):

@@ -205,6 +205,9 @@ def test_a_finished_pool_does_not_lose_scenarios_by_a_smaller_n(capsys, made):
     assert cli.run(("generate", "task=domino_single", f"n={there - 1}", f"pool={made}")) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert f"has {there} scenarios, of which {there - 1} would be left: give n={there} or more" in said
+    with pytest.raises(BadConfig, match="would be left"):
+        fewer = generate.GenerateSettings(n=there - 1, pool=str(made))
+        generate.generate(load_task("domino_single"), QUICK, fewer, lambda *_: None)
     assert Pool.open(made).sha256 == before
 
 

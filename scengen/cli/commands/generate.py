@@ -12,9 +12,7 @@ from rich.table import Table
 from ...compose import Combination, combinations
 from ...errors import BadConfig, ScengenError, cut
 from ...perturb.perturbation import NONE, Perturbation
-from ...pool import Pool, collection
-from ...pool.kinds import marks
-from ...pool.manifest import MANIFEST
+from ...pool import collection
 from ...runs.generate import GenerateSettings, Summary, generate
 from ...runs.journal import begun
 from ...runs.progress import ProgressBar
@@ -60,7 +58,7 @@ class Run:
         if settings.sampler == "sobol" and settings.n < SOBOL:
             what = f"in {settings.n} points of a Sobol set some pairs of parameters correlate by chance"
             warn(f"scengen: {what}, up to 0.95 at 32; give n={SOBOL} or more, or sampler=lhs:{settings.n}")
-        _check_not_fewer(settings.folder(task), settings)
+        settings.check(task)
         say_begun(begun(settings.folder(task)), "draws", settings.folder(task), settings.fresh)
         rejections: Counter[str] = Counter()
         try:
@@ -91,15 +89,6 @@ class Run:
                 "indices; see the reasons above, play one with scengen try, or raise limit="
             )
         return summary
-
-
-def _check_not_fewer(folder: Path, settings: GenerateSettings) -> None:
-    """Raise `BadConfig` if a finished pool would lose scenarios."""
-    if not settings.fresh and MANIFEST in marks(folder) and (there := len(Pool.open(folder))) > settings.n:
-        remedy = f"give n={there} or more, another pool=, or fresh=true to move it aside"
-        raise BadConfig(
-            f"n = {settings.n}; {folder} has {there} scenarios, of which {settings.n} would be left: {remedy}"
-        )
 
 
 def command(arguments: Arguments) -> int:

@@ -114,7 +114,7 @@ def command(arguments: Arguments) -> int:
 
 @contextmanager
 def _reported(settings: VerifySettings) -> Iterator[dict[str, Report | str]]:
-    """Reports by pool, which become the file for CI systems. An error is the report of the pool in which it occurred.
+    """Reports by pool, which become the files. An error is the report of the pool in which it occurred.
 
     A pool that is not verified yet has an empty report.
     """
@@ -126,8 +126,13 @@ def _reported(settings: VerifySettings) -> Iterator[dict[str, Report | str]]:
         reports[next((pool for pool, report in reports.items() if not report), given)] = str(error)
         raise
     finally:
-        if settings.junit and all(reports.values()) and reports:
-            write(Path(settings.junit), junit(reports, settings.level))
+        if reports and all(reports.values()):
+            if settings.junit:
+                write(Path(settings.junit), junit(reports, settings.level))
+            if settings.json:
+                plain = {folder: _plain(report) for folder, report in reports.items()}
+                alone = len(plain) == 1 and not isinstance(settings.pool, list)
+                write_json(settings.json, next(iter(plain.values())) if alone else plain)
 
 
 def _verify_pools(
@@ -169,17 +174,16 @@ def _verify_pools(
             report = verified(pool, options, search, progress_bar.show)
         reports[folder] = found[folder] = _with_scans(report, pool, settings.ycb)
         _print_report(pool, found[folder])
-    if settings.json:
-        plain = {folder: _plain(report) for folder, report in found.items()}
-        write_json(settings.json, plain[folders[0]] if len(folders) == 1 else plain)
     verdicts = Counter(report.verdict for report in found.values())
     if len(folders) > 1:
         say(f"{len(folders)} pools: {', '.join(f'{verdicts[v]} {v}' for v in STATUS)}")
     return next(status for verdict, status in WORST.items() if verdicts[verdict])
 
 
-def _plain(report: Report) -> dict[str, object]:
-    """A report as plain data."""
+def _plain(report: Report | str) -> dict[str, object]:
+    """A report as plain data, or the error because of which there is none."""
+    if isinstance(report, str):
+        return {"error": report}
     return {key: value for key, value in vars(report).items() if key != "names"}
 
 
