@@ -29,6 +29,8 @@ WHOLE = frozenset(
 _ELEMENTS = re.compile(r"(opt|body|jnt|dof|geom|site|cam|light|eq|exclude|pair|tendon|wrap|actuator|sensor|mat)_")
 """Beginning of the fields of a model whose whole numbers say what its elements are. Meshes and search trees have whole
 numbers that depend on rounding."""
+_UNCOMPARED = ("bvh", "ctrlspec")
+"""Parts of the names of fields of search trees, and of the kind of an actuator's input, which only MuJoCo 4 writes."""
 SECTIONS = (
     "compiler",
     "option",
@@ -160,7 +162,9 @@ def _other_model(text: str, rebuilt: str, embodiment: str) -> str:
     if here.names != there.names:
         return f"{NOT_REBUILT}: its elements have other names"
     for name in dir(there):
-        values = getattr(there, name) if _ELEMENTS.match(name) and "bvh" not in name else None
+        values = (
+            getattr(there, name) if _ELEMENTS.match(name) and not any(part in name for part in _UNCOMPARED) else None
+        )
         if isinstance(values, np.ndarray) and values.dtype.kind in "iub":
             if not np.array_equal(values, getattr(here, name)):
                 return f"{NOT_REBUILT}: compiled, {name} differs"

@@ -287,7 +287,8 @@ def test_a_film_strip_shows_something_or_the_error_names_the_remedy(made, capsys
         assert "libegl1" in str(error)
     else:
         first, last = picture[:, :320].astype(int), picture[:, -320:].astype(int)
-        assert picture.shape == (240, 1280, 3) and picture.std() > 20
+        assert picture.shape[0] > 240 and picture.shape[1:] == (1280, 3), "the means of the task are below"
+        assert picture.std() > 20
         assert np.abs(first - last).max() > 50, "the arm moves and tiles fall"
 
 
