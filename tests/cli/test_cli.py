@@ -211,6 +211,19 @@ def test_a_finished_pool_does_not_lose_scenarios_by_a_smaller_n(capsys, made):
     assert Pool.open(made).sha256 == before
 
 
+def test_show_takes_an_index_in_place_of_an_id(capsys, made):
+    *_, row = Pool.open(made).rows()
+    assert cli.run(("show", f"pool={made}", f"index={row.index}")) == 0
+    assert str(row.name) in capsys.readouterr().out
+    for words, says in (
+        (("show", f"id={row.id}", "index=0"), "give one of them"),
+        (("show", "index=999"), "no scenario has it"),
+        (("show", "view"), "give id=ID or index=N"),
+    ):
+        assert cli.run((*words, f"pool={made}")) == 2
+        assert says in capsys.readouterr().err
+
+
 def test_show_prints_pools_and_scenarios(capsys, made):
     row = next(Pool.open(made).rows())
     assert cli.run(("show", f"pool={made}")) == 0 and row.id in capsys.readouterr().out
