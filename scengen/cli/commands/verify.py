@@ -163,8 +163,8 @@ def _verify_pools(
         secrets.randbelow(2**32) if settings.seed is None else settings.seed,
         settings.workers,
         limits,
-        settings.mujoco == ANY,
         attacked,
+        settings.mujoco == ANY,
     )
     found: dict[str, Report] = {}
     for folder in folders:

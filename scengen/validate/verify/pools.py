@@ -46,10 +46,10 @@ class Options:
     workers: Workers = 1
     limits: Limits | None = LIMITS
     """Limits of one scenario; None to work in this process."""
-    any_mujoco: bool = False
-    """Whether a pool that another MuJoCo certified is judged. Bits are not compared, and what differs is declined."""
     adversary: Adversary | None = None
     """The adversary at level full, if the certificates require an attack; see `certify.certify`."""
+    any_mujoco: bool = False
+    """Whether a pool that another MuJoCo certified is judged. Bits are not compared, and what differs is declined."""
 
 
 def verify(
