@@ -1,7 +1,7 @@
 # scengen with OpenGL without a display, as a user without rights. Its working folder is /out:
 #   docker build --tag scengen . && mkdir -p out
 #   docker run --rm --user "$(id -u):$(id -g)" --volume "$PWD/out:/out" scengen generate task=packing n=10 pool=packing
-# The demo: docker run --rm --user "$(id -u):$(id -g)" --volume "$PWD/out:/out" --entrypoint make scengen -C /scengen demo DEMO=/out/demo
+# The demo: docker run --rm --user "$(id -u):$(id -g)" --volume "$PWD/out:/out" --entrypoint make scengen -C /scengen demo DEMO=/out
 # The digest is that of the index for all platforms; docker buildx imagetools inspect python:3.11-slim-bookworm prints the newest one.
 FROM python:3.11.16-slim-bookworm@sha256:a36c24f9cbdf4fd0f52d67f0823eeac19c2028c637cecc392d97f980d4fec56b
 

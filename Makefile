@@ -1,9 +1,9 @@
-# make demo: certify and verify two small pools.   make test: run the tests.   make ci: everything that CI runs.
+# make demo: certify and verify the two pools of the README.   make test: run the tests.   make ci: everything that CI runs.
 PYTHON ?= python3
 ENV := .venv
 BIN := $(ENV)/bin
 READY := $(ENV)/.ready
-DEMO := generated/demo
+DEMO := generated
 
 .PHONY: setup demo ci test wheel stored slow durations readme fuzz kills check types format certify stacks stack-sample warp readers integrations figures axes beliefs attacks drift baselines curves docs docs-links results pictures site reference bench clean checker checker-base mutants behaviour behaviour-check tag
 
@@ -17,11 +17,12 @@ $(READY): pyproject.toml constraints.txt
 	@touch $(READY)
 
 demo: setup
-	$(BIN)/scengen generate task=domino_single n=6 workers=2 pool=$(DEMO)/id
-	$(BIN)/scengen generate task=domino_single split=low_starter n=6 workers=2 pool=$(DEMO)/low_starter
+	$(BIN)/scengen generate task=domino_single n=10 workers=2 pool=$(DEMO)/id
+	$(BIN)/scengen generate task=domino_single split=low_starter n=10 workers=2 pool=$(DEMO)/low_starter
 	$(BIN)/scengen verify pool=$(DEMO)/id workers=2
 	$(BIN)/scengen verify pool=$(DEMO)/low_starter workers=2
 	$(BIN)/scengen show pool=$(DEMO)/id,$(DEMO)/low_starter to=$(DEMO)/contact_sheet.html films=true
+	@echo "20 scenarios are certified and verified: open $(DEMO)/contact_sheet.html in a browser, then see README.md, Generate, verify, look"
 
 # What continuous integration runs. The certified sample is two of the paper's OOD conditions; the stored behaviour has all tasks.
 # What runs on one core runs two at a time.
@@ -250,4 +251,4 @@ tag:
 	git tag --annotate "v$$version" --message "scengen $$version" && echo "tagged v$$version; publish it with git push origin v$$version"
 
 clean:
-	rm -rf $(ENV) $(DEMO) $(DEMO).run build dist *.egg-info
+	rm -rf $(ENV) build dist *.egg-info

@@ -284,6 +284,8 @@ PATHS = (
 )
 """Settings with paths, addresses or words of people, which are taken as they are: no letter in them means anything to
 Hydra, except in a value that is quoted or a list in brackets."""
+OPENING = {"{": "}", "[": "]"}
+"""Brackets around groups and lists, each with the closing one."""
 HYDRAS = re.compile(r"""'.*'|".*"|\[.*\]|\w+\(.*\)|null""", re.S)
 """Values that may be Hydra's: quoted ones, lists, functions such as `choice(a,b)`, and null."""
 
@@ -399,6 +401,8 @@ def _check_override(verb: str, text: str) -> None:
             if why := unread(str(folder)):
                 raise BadConfig(f"{quoted}: {why}")
     in_group = key in ("task", "certify", "executor") and key in groups(verb)
+    if in_group and isinstance(value := override.value(), list):
+        raise BadConfig(f"{quoted} is a list; give {key}={','.join(map(str, value))} without brackets")
     if in_group and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
         raise BadConfig(f"{quoted}: expected the name of a file of conf/{key} without .yaml; {_files_of(key)}")
     if key in groups(verb) and override.value() is None:
@@ -445,7 +449,15 @@ def _known(verb: str) -> list[str]:
 
 def _remedy(verb: str, text: str) -> str:
     """The remedy for an override that Hydra cannot read: a name for a bare word, or quotes as a shell takes them."""
+    parts = re.split(r"\s+(?=[+~]{0,2}[\w./]+=)", text)
+    if len(parts) > 1 and all(map(_parsed, parts)):
+        return f"; these are {len(parts)} settings: give {' '.join(map(shlex.quote, parts))}"
     key, given, value = text.partition("=")
+    if value[:1] in OPENING:
+        split = any(value.count(opening) > value.count(closing) for opening, closing in OPENING.items())
+        if split:
+            return f"; a shell splits it at spaces: put all of it in single quotes, '{key}=...'"
+        return '; put double quotes around texts within it, as in {why: "a; b"}'
     fixed = f'{key}="{value}"'
     if given and len(text) < SHOWN_LENGTH and re.fullmatch(r"[\w.+]+", key) and _parsed(fixed):
         return f"; quote the value twice: {shlex.quote(fixed)}"

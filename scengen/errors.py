@@ -40,7 +40,12 @@ class UnknownName(ScengenError):
         names = sorted({*known})
         close = f" (did you mean {meant!r}?)" if meant else nearest(name, names)
         also = "".join(f", nor {cut(repr(other))}{nearest(other, names)}" for other in others)
-        super().__init__(f"no {kind} named {cut(repr(name))}{close}{also}; known: {', '.join(names) or '(none)'}")
+        listed, remedy = ", ".join(names) or "(none)", f"; {REMEDIES[kind]}" if kind in REMEDIES else ""
+        super().__init__(f"no {kind} named {cut(repr(name))}{close}{also}; known: {listed}{remedy}")
+
+
+REMEDIES = {"task": "hydra.searchpath=FOLDER adds the folder that holds your task/NAME.yaml"}
+"""Remedies for unknown names, by kind."""
 
 
 class Infeasible(ScengenError):

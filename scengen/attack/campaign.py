@@ -21,7 +21,7 @@ from ..validate.rebuilt import rebuild, world_of
 from ..validate.rollout import run
 from ..validate.settings import FEWEST, lower_bound
 from ..validate.verify.claims import alike
-from ..work.fingerprint import fingerprint
+from ..work.fingerprint import same_bits
 from ..work.limits import at_least
 from ..work.log import FRESH, Log, recorded
 from ..work.parallel import Limits, Workers, each
@@ -361,7 +361,7 @@ def wrong_hits(pool: Pool, task: Task) -> Iterator[tuple[str, str]]:
                 yield entry["file"], f"the pool holds {found.scenario}, which this hit refutes"
             elif why := (again := replayed(found, task)).fault:
                 yield entry["file"], why
-            elif not again.exact and pool.manifest.fingerprint == fingerprint():
+            elif not again.exact and same_bits(pool.manifest):
                 yield entry["file"], "the replay ends in other bits than the hit says"
         except (ScengenError, OSError, ValueError) as error:
             yield entry["file"], str(error)

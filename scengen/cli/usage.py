@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from ..errors import BadConfig
+from ..errors import UnknownName
 from ..samplers import task_files
 
 WIDTH = 118
@@ -98,7 +98,7 @@ def _tasks(overrides: Sequence[str], search: Sequence[str]) -> list[str]:
     chosen = [word.removeprefix("task=") for word in overrides if word.startswith("task=")]
     known = task_files.tasks(search)
     if chosen and chosen[-1] not in known:
-        raise BadConfig(f"no task named {chosen[-1]!r}; known: {', '.join(known)}")
+        raise UnknownName("task", chosen[-1], known)
     return chosen[-1:] or known
 
 

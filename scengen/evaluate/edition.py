@@ -124,6 +124,8 @@ class Edition:
         path = path_of(name)
         if not path.exists() or path.is_dir():
             known = sorted(file.stem for file in (conf_dir() / "editions").glob("*.yaml"))
+            if "," in name:
+                raise BadConfig(f"edition = {cut(name)}; give one of them, and repeat the command for the others")
             raise UnknownName("edition", name, [*known, "FILE.yaml"])
         node = read_yaml("edition", path)
         if (given := node.get("format")) != FORMAT:

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from ..errors import PoolError
+from ..errors import PoolError, nearest
 
 POLICY = "policy.json"
 """File that marks a trained policy."""
@@ -60,4 +60,5 @@ def check_there(folder: Path, mark: str, maker: str) -> None:
         why = f"{mark} is missing; a run was started there; repeat its command to finish it"
     else:
         why = f"{mark} is missing; see scengen {maker}"
-    raise PoolError(f"no {MARKS[mark].removeprefix('a ')} at {folder}: {why}")
+    alike = nearest(folder.name, (path.name for path in folder.parent.glob("*/") if path != folder and marks(path)))
+    raise PoolError(f"no {MARKS[mark].removeprefix('a ')} at {folder}{alike}: {why}")

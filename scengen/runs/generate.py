@@ -14,7 +14,8 @@ from ..certificate import CHECKS, STAGES, StoredCertificate
 from ..errors import BadConfig, Infeasible
 from ..pool import Pool, PoolRow, writing
 from ..pool.files import replace_file, sha256
-from ..pool.manifest import PROCESS, Manifest, RunConfig
+from ..pool.kinds import marks
+from ..pool.manifest import MANIFEST, PROCESS, Manifest, RunConfig
 from ..samplers.split import ID, Split
 from ..samplers.task import Draw, Task
 from ..validate import lock
@@ -53,7 +54,7 @@ class GenerateSettings:
         return Path(self.pool or Path("generated", f"{task.name}-{Split.parse(self.split)}"))
 
     def check(self, task: Task) -> None:
-        """Raise `ScengenError` for a setting that makes no sense for this task."""
+        """Raise `ScengenError` for a setting that makes no sense for this task, or would shorten a finished pool."""
         at_least(self, n=1, seed=0, workers=1, limit=1, limit_seconds=1, limit_mb=200, attack=0)
         if self.attack:
             attacks.check_budget("attack", self.attack, self.n)
@@ -61,6 +62,10 @@ class GenerateSettings:
         for verdict in self.keep:
             if verdict not in ("refuted", "unknown"):
                 raise BadConfig(f"keep = {verdict}; it must be refuted, unknown, or both")
+        folder = self.folder(task)
+        if not self.fresh and MANIFEST in marks(folder) and (there := len(Pool.open(folder))) > self.n:
+            told = f"n = {self.n}; {folder} has {there} scenarios, of which {self.n} would be left"
+            raise BadConfig(f"{told}: give n={there} or more, another pool=, or fresh=true to move it aside")
 
 
 @dataclass(frozen=True)

@@ -109,6 +109,9 @@ def filmed(world: World, scenario: Scenario, actions: Actions, horizon: float, r
 def light(api: viser.SceneApi) -> None:
     """Light a scene with viser's lamps, which throw shadows, and with light from everywhere, for which shadows are not
     black. `EXPOSURE` keeps light things from becoming white.
+
+    Shadows cost browsers that draw in software half of their pictures: 0.6 a second instead of 1.3 with Chromium's
+    SwiftShader on two busy cores, 876 x 800 pixels. They stay because almost all browsers draw on a graphics card.
     """
     api.configure_default_lights(cast_shadow=True)
     api.configure_environment_map(hdri=None)

@@ -27,7 +27,7 @@ def check_versions(made: Mapping[str, str], where: str) -> None:
         if made[package] != versions()[package]:
             raise OtherVersions(
                 f"{where} was certified with {package} {made[package]}, this is {versions()[package]}; install that "
-                "version, or run scengen verify and certify the pool again"
+                "version, or certify the pool again (scengen verify mujoco=any shows what holds here)"
             )
 
 

@@ -12,6 +12,7 @@ from ..errors import BadConfig, contrasted, cut
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.embodiment import JAW
+from ..sim.models import model_difference
 from ..sim.world import World
 from .impaired import posed
 
@@ -28,6 +29,8 @@ WHOLE = frozenset(
 _ELEMENTS = re.compile(r"(opt|body|jnt|dof|geom|site|cam|light|eq|exclude|pair|tendon|wrap|actuator|sensor|mat)_")
 """Beginning of the fields of a model whose whole numbers say what its elements are. Meshes and search trees have whole
 numbers that depend on rounding."""
+_UNCOMPARED = ("bvh", "ctrlspec")
+"""Parts of the names of fields of search trees, and of the kind of an actuator's input, which only MuJoCo 4 writes."""
 SECTIONS = (
     "compiler",
     "option",
@@ -102,14 +105,8 @@ def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> s
     """
     if text == rebuilt:
         return ""
-    if not text or not rebuilt:
-        return f"{NOT_REBUILT}: {'it' if rebuilt else 'that'} is empty"
-    if "<?" in text:
-        return f"{NOT_REBUILT}: it has instructions for programs (<?...?>)"
-    try:
-        scene_text.check(text)
-    except BadConfig as error:
-        return f"{NOT_REBUILT}: {error}"
+    if why := _unreadable(text, rebuilt):
+        return why
     here, there = list(ET.fromstring(text).iter()), list(ET.fromstring(rebuilt).iter())
     for a, b in zip(here, there, strict=False):
         where = f"<{b.tag} {b.attrib.get('name', '')}>".replace(" >", ">")
@@ -129,6 +126,32 @@ def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> s
     return _other_model(text, rebuilt, embodiment)
 
 
+def other_physics(text: str, rebuilt: str, embodiment: str = JAW) -> str:
+    """How the physics of a pool's scene differs from that of the rebuilt one, as text; empty if it does not.
+
+    Both are compiled by the MuJoCo of this process, which writes the same scene otherwise than the one of the pool.
+    """
+    if text == rebuilt:
+        return ""
+    if why := _unreadable(text, rebuilt) or _other_model(text, rebuilt, embodiment):
+        return why
+    why = model_difference(World.load(text, embodiment).model, World.load(rebuilt, embodiment).model)
+    return f"{NOT_REBUILT}: {why}" if why else ""
+
+
+def _unreadable(text: str, rebuilt: str) -> str:
+    """Reason why the scene of a pool is not read although it differs from the rebuilt one; empty if it is."""
+    if not text or not rebuilt:
+        return f"{NOT_REBUILT}: {'it' if rebuilt else 'that'} is empty"
+    if "<?" in text:
+        return f"{NOT_REBUILT}: it has instructions for programs (<?...?>)"
+    try:
+        scene_text.check(text)
+    except BadConfig as error:
+        return f"{NOT_REBUILT}: {error}"
+    return ""
+
+
 def _other_model(text: str, rebuilt: str, embodiment: str) -> str:
     """How the model of a scene whose text says nearly the same differs from the rebuilt one; empty if it does not."""
     try:
@@ -139,7 +162,9 @@ def _other_model(text: str, rebuilt: str, embodiment: str) -> str:
     if here.names != there.names:
         return f"{NOT_REBUILT}: its elements have other names"
     for name in dir(there):
-        values = getattr(there, name) if _ELEMENTS.match(name) and "bvh" not in name else None
+        values = (
+            getattr(there, name) if _ELEMENTS.match(name) and not any(part in name for part in _UNCOMPARED) else None
+        )
         if isinstance(values, np.ndarray) and values.dtype.kind in "iub":
             if not np.array_equal(values, getattr(here, name)):
                 return f"{NOT_REBUILT}: compiled, {name} differs"

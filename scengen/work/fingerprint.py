@@ -1,11 +1,14 @@
 """Fingerprint of the machine: machines with equal fingerprints replay actions bit for bit."""
 
+from collections.abc import Mapping
 from functools import cache
+from typing import Protocol
 
 import numpy as np
 
 from ..assets.box import Domino
 from ..assets.prop import TABLE_TOP, place, table
+from ..installation import versions
 from ..sim import scene_text
 from ..sim.world import World
 
@@ -23,3 +26,18 @@ def fingerprint() -> str:
     for k in range(30):
         world.step(np.array([np.sin(0.3 * k), np.cos(0.2 * k), -0.5, 0.1, -0.2, 0.3, 1.0]))
     return world.digest
+
+
+class Made(Protocol):
+    """A manifest or a certificate, which states what it was made with."""
+
+    @property
+    def versions(self) -> Mapping[str, str]: ...
+
+    @property
+    def fingerprint(self) -> str: ...
+
+
+def same_bits(made: Made) -> bool:
+    """Whether recorded actions must replay bit for bit here: same rounding, and the same MuJoCo."""
+    return made.fingerprint == fingerprint() and made.versions["mujoco"] == versions()["mujoco"]

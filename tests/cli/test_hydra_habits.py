@@ -17,7 +17,7 @@ from scengen.cli.commands.settings import read_task
 from scengen.cli.completion import BASH, completions
 from scengen.cli.usage import usage
 from scengen.cli.verbs import parsed
-from scengen.errors import BadConfig
+from scengen.errors import UnknownName
 from scengen.pool import Pool
 from scengen.samplers import task_files
 
@@ -184,7 +184,7 @@ def test_every_help_has_an_example_that_can_be_composed(verb):
 def test_the_help_of_a_chosen_task_tells_its_splits_alone():
     text = usage("generate", ["task=packing"])
     assert "four_pieces tight" in text and "turned_slab" not in text
-    with pytest.raises(BadConfig, match="no task named 'packin'"):
+    with pytest.raises(UnknownName, match="no task named 'packin' .*hydra.searchpath=FOLDER adds"):
         usage("generate", ["task=packin"])
 
 
@@ -239,6 +239,16 @@ def test_bash_gets_what_comes_after_its_own_word_breaks(tmp_path):
         (("generate", "task=domino_single", f"seed={'9' * 5000}"), "a number of more than 4300 digits"),
         (("agent", "key=a=b"), "quote the value twice: 'key=\"a=b\"'"),
         (("show", "look=x{y"), "quote the value twice: 'look=\"x{y\"'"),
+        (("generate", "+task.axes.x={why:", "new}"), "put all of it in single quotes, '+task.axes.x=...'"),
+        (("generate", "task.id.x=[uniform,", "0,", "1]"), "put all of it in single quotes, 'task.id.x=...'"),
+        (
+            ("generate", "+task.axes.x={why: it is heavy; so}"),
+            'double quotes around texts within it, as in {why: "a; b"}',
+        ),
+        (("generate", "task=packing n=2"), "these are 2 settings: give task=packing n=2"),
+        (("generate", "task=[packing,cup_extract]"), "is a list; give task=packing,cup_extract without brackets"),
+        (("evaluate", "policy=idle", "edition=v1,v2"), "edition = v1,v2; give one of them"),
+        (("generate", "task=packin", "--help"), "(did you mean 'packing'?)"),
         (("generate", "task=domino_single", "task.horizon.x=3"), "task.horizon has no settings in it"),
     ],
 )

@@ -10,6 +10,7 @@ import pytest
 from helpers import REFERENCE
 
 from scengen import cli
+from scengen.cli.commands import identified
 from scengen.means import throughout
 from scengen.pool import Pool
 from scengen.pool.demonstrations import DEMONSTRATIONS, Demonstrations
@@ -42,6 +43,8 @@ def test_show_says_what_kept_rollouts_are(kept, capsys):
     shown = " ".join((out.out + out.err).split())
     assert "kept rollouts of policy random on domino_single/id, strict rules: 0 successes" in shown
     assert all(str(name) in out.out for name in {row.name for row in rollouts(kept, "random").attempts()})
+    name = next(rollouts(kept, "random").attempts()).name
+    assert identified(str(folder), None, name.index) == name.id, "failed rollouts have an index, too"
     assert cli.run(["show", f"pool={folder}", "to=sheet.html"]) == 2
     assert "scengen show film" in capsys.readouterr().err
     assert cli.run(["evaluate", "policy=idle", f"pool={folder}"]) == 2

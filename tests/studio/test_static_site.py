@@ -51,6 +51,9 @@ def test_search_and_sliders(opened, served):
     axis.locator("input[type=range]").fill("1")
     assert axis.locator(".steps figure").first.is_visible() and not axis.locator(".steps figure").last.is_visible()
     assert axis.locator("output").inner_text() == "1 of 2" and not tab.faults
+    axis.locator("input[type=range]").focus()
+    tab.page.keyboard.press("/")
+    assert tab.page.evaluate("document.activeElement.type") == "search", "a slider takes no letters"
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -7,7 +7,17 @@ from scengen import load_task
 from scengen.control.teleop import Filter
 from scengen.demos.teleop.mapping import action_of, advanced
 from scengen.demos.teleop.pad import Pad, PadEvent
-from scengen.demos.teleop.session import ENDED, PAUSED, READY, RUNNING, SETTLING, Session, Stage
+from scengen.demos.teleop.session import (
+    ENDED,
+    MISSING,
+    PAUSED,
+    READY,
+    RESUME,
+    RUNNING,
+    SETTLING,
+    Session,
+    Stage,
+)
 from scengen.errors import ScengenError
 from scengen.validate.rebuilt import rebuild
 from scengen.validate.verify.claims import passed_filter
@@ -120,7 +130,17 @@ def test_an_unplugged_pad_pauses_the_episode_until_start_is_pressed():
     hold(session, 30, connected=0.0, lefty=0.0)
     assert (session.phase, len(session.actions)) == (PAUSED, 20) and "unplugged" in session.line.message
     hold(session, 30, connected=1.0)
-    assert (session.phase, len(session.actions)) == (PAUSED, 20)
+    assert (session.phase, len(session.actions)) == (PAUSED, 20) and session.message == RESUME
+    press(session, "start")
+    assert session.phase == RUNNING and not session.message
+
+
+def test_a_take_that_starts_without_a_pad_names_none_that_was_unplugged():
+    session = Session(stage_of())
+    hold(session, 3, connected=0.0)
+    assert (session.phase, session.message) == (PAUSED, MISSING)
+    hold(session, 3, connected=1.0)
+    assert (session.phase, session.message) == (PAUSED, RESUME)
     press(session, "start")
     assert session.phase == RUNNING and not session.message
 

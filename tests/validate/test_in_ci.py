@@ -64,6 +64,20 @@ def test_a_missing_pool_is_an_error_of_its_own_beside_those_that_were_verified(t
     assert found[1].attrib["name"] == f"scengen verify {tmp_path / 'nowhere'}"
 
 
+def test_json_is_written_for_a_missing_pool_too(tmp_path):
+    file, nowhere = tmp_path / "out.json", tmp_path / "nowhere"
+    assert cli.run(["verify", f"pool={nowhere}", f"json={file}"]) == 2
+    assert "manifest.json is missing" in json.loads(file.read_text())["error"]
+    assert cli.run(["verify", f"pool={REFERENCE},{nowhere}", "level=replay", "sample=1", f"json={file}"]) == 2
+    told = json.loads(file.read_text())
+    assert told[str(REFERENCE)]["verdict"] == "sound" and "is missing" in told[str(nowhere)]["error"]
+
+
+def test_a_missing_pool_is_told_with_the_nearest_folder_beside_it(of_another_mujoco, capsys):
+    assert cli.run(["verify", f"pool={of_another_mujoco}d"]) == 2
+    assert "oldd (did you mean 'old'?): manifest.json is missing" in capsys.readouterr().err
+
+
 @pytest.fixture
 def of_another_mujoco(tmp_path):
     """A pool that says that it was certified with another MuJoCo."""

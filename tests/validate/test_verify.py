@@ -411,6 +411,28 @@ def test_older_software_is_declined(mine):
     assert found.verdict == "declined" and "certified with mujoco 3.3.0" in found.failed[0]["reason"]
 
 
+def test_a_pool_of_another_mujoco_is_judged_by_what_holds_here_on_request(mine):
+    of = Pool.open(mine)
+    older = {**of.manifest.versions, "mujoco": "3.3.0"}
+    (mine / "scengen.lock").unlink()
+
+    def judged(forge):
+        rows = [certificate_of(forge(row), versions=older) for row in of.rows()]
+        write_pool(mine, replace(of.manifest, versions=older), rows)
+        return report(mine, any_mujoco=True, sample=None)
+
+    found = judged(certificate_with(final_state="0" * 32))
+    assert (found.verdict, found.sound, found.drifted) == ("sound", len(of), len(of))
+    assert any("certified with mujoco 3.3.0, this is" in remark for remark in found.remarks)
+    found = judged(witness(lambda actions: actions * 0))
+    assert (found.verdict, found.declined) == ("declined", len(of))
+    assert "certified with mujoco 3.3.0" in found.failed[0]["reason"] and "witness fails" in found.failed[0]["reason"]
+    found = judged(witness(beyond))
+    assert (found.verdict, found.refuted) == ("refuted", len(of)), (
+        "what needs no simulation is a fault under any MuJoCo"
+    )
+
+
 def test_rows_in_another_order_or_twice_are_noticed(mine):
     of = Pool.open(mine)
     made = list(of.rows())

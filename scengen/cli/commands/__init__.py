@@ -11,6 +11,7 @@ from typing import Any
 
 from ...errors import BadConfig, cut
 from ...pool import Pool, PoolRow, collection
+from ...pool.demonstrations import Demonstrations, is_demonstrations
 from ...pool.library import Library
 from ...pool.library import names as names  # for the commands
 from ...pool.names import Misnamed
@@ -96,6 +97,34 @@ def holder(pool: str | list[str] | None, name: str) -> Pool:
         return found[0].check()
     library = Library(found)
     return found[library.source(library.find(name))].check()
+
+
+def identified(pool: str | list[str], name: str | None, index: int | None) -> str:
+    """The name of a scenario that was given, or the id of the one that was drawn at an index.
+
+    Args:
+        pool: folders of pools, demonstrations or kept rollouts.
+
+    Raises:
+        BadConfig: neither or both were given, or not exactly one scenario has the index.
+    """
+    if name is not None and index is not None:
+        raise BadConfig(f"id = {cut(name)} and index = {index}; give one of them")
+    if index is None:
+        if name is None:
+            raise BadConfig("no scenario was given; give id=ID or index=N")
+        return name
+    found = dict[str, str]()
+    for folder in several(pool):
+        if is_demonstrations(folder):
+            rows = Demonstrations.open(folder).check().attempts()
+            found.update({row.id: str(row.name) for row in rows if row.index == index})
+        elif (place := (opened := Pool.open(folder).check()).directory.of_index(index)) is not None:
+            found[opened.directory.id(place)] = str(opened.name_at(place))
+    if len(found) != 1:
+        which = f"{len(found)} scenarios have it, {cut(', '.join(found.values()))}" if found else "no scenario has it"
+        raise BadConfig(f"index = {index}; {which}; scengen show lists them, and id=ID selects one")
+    return next(iter(found))
 
 
 def chosen(pool: Pool, name: str) -> PoolRow:

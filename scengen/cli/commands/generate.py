@@ -60,7 +60,7 @@ class Run:
         if settings.sampler == "sobol" and settings.n < SOBOL:
             what = f"in {settings.n} points of a Sobol set some pairs of parameters correlate by chance"
             warn(f"scengen: {what}, up to 0.95 at 32; give n={SOBOL} or more, or sampler=lhs:{settings.n}")
-        _check_not_fewer(settings.folder(task), settings)
+        settings.check(task)
         folder = settings.folder(task)
         say_begun(count := begun(folder), _draws(folder, count), folder, settings.fresh)
         rejections: Counter[str] = Counter()
@@ -98,15 +98,6 @@ def _draws(folder: Path, count: int) -> str:
     """What an earlier run has made. Several workers draw ahead of what the pool of a finished run needs."""
     used = Pool.open(folder).manifest.indices if MANIFEST in marks(folder) else count
     return "draws" if used == count else f"draws ({used} of them in its pool)"
-
-
-def _check_not_fewer(folder: Path, settings: GenerateSettings) -> None:
-    """Raise `BadConfig` if a finished pool would lose scenarios."""
-    if not settings.fresh and MANIFEST in marks(folder) and (there := len(Pool.open(folder))) > settings.n:
-        remedy = f"give n={there} or more, another pool=, or fresh=true to move it aside"
-        raise BadConfig(
-            f"n = {settings.n}; {folder} has {there} scenarios, of which {settings.n} would be left: {remedy}"
-        )
 
 
 def command(arguments: Arguments) -> int:

@@ -19,7 +19,7 @@ from ...validate.playable import check_row
 from ...work.limits import at_least
 from ...work.targets import try_file
 from .. import tables
-from . import OK, Arguments, chosen, err, holder, out, remark, say, several, write, write_json
+from . import OK, Arguments, chosen, err, holder, identified, out, remark, say, several, write, write_json
 from .settings import read
 
 MAX_DETAILED_POOLS = 3
@@ -36,6 +36,7 @@ class ShowSettings:
 
     pool: str | list[str]
     id: str | None
+    index: int | None
     to: str | None
     images: int
     films: bool
@@ -45,6 +46,8 @@ class ShowSettings:
 
 def command(arguments: Arguments) -> int:
     settings = read("show", arguments, ShowSettings)
+    if settings.index is not None:
+        settings = replace(settings, id=identified(settings.pool, settings.id, settings.index))
     try_file(settings.json)
     target, look = Path(settings.to) if settings.to else None, look_named(settings.look)
     if settings.id is None:

@@ -29,7 +29,7 @@ from ...validate.rebuilt import rebuild
 from ...validate.verify.stored import task_of_manifest
 from ...work.limits import at_least
 from ...work.targets import try_file
-from . import OK, Arguments, chosen, err, holder, misnaming_remarked, remark, say, several, write
+from . import OK, Arguments, chosen, err, holder, identified, misnaming_remarked, remark, say, several, write
 from .settings import read
 
 MAX_STRIP_PIXELS = 100_000_000
@@ -42,6 +42,7 @@ class FilmSettings:
 
     pool: str | list[str] | None
     id: str | None
+    index: int | None
     hit: str | None
     to: str
     of: str
@@ -63,8 +64,9 @@ class FilmSettings:
 
     def check(self) -> None:
         """Raise `BadConfig` for settings that are not valid."""
-        if (self.hit is None) == (self.id is None) or (self.hit is None and self.pool is None):
-            raise BadConfig("show film needs either pool=FOLDER and id=ID, or hit=FILE; see scengen show film --help")
+        named = self.id is not None or self.index is not None
+        if (self.hit is None) != named or (named and self.pool is None):
+            raise BadConfig("show film needs either pool=FOLDER and id=ID (or index=N), or hit=FILE")
         if Path(self.to).suffix not in (".png", ".mp4"):
             raise BadConfig(f"to = {self.to}; give a .png file for a film strip or an .mp4 file for a video")
         if self.raw and self.of == WITNESS:
@@ -115,6 +117,7 @@ def _take(settings: FilmSettings, arguments: Arguments) -> tuple[Take, Words]:
     """What is filmed, and its instruction with other wordings."""
     if settings.hit:
         return _take_of_hit(settings, arguments)
+    settings = replace(settings, id=identified(settings.pool or "", settings.id, settings.index))
     folders = several(settings.pool or "")
     if any(map(is_demonstrations, folders)):
         return _take_of_run(settings, folders, arguments)

@@ -18,7 +18,7 @@ from ...samplers.task_files import search_path
 from ...validate.playable import check_row
 from ...work.limits import at_least
 from ...work.targets import try_file
-from . import OK, Arguments, chosen, err, holder, say, write
+from . import OK, Arguments, chosen, err, holder, identified, say, write
 from .settings import read
 
 EVERY = "all"
@@ -30,7 +30,8 @@ class SheetSettings:
     """Settings of `scengen show perturb`; conf/command/show_perturb.yaml explains them."""
 
     pool: str | list[str]
-    id: str
+    id: str | None
+    index: int | None
     perturb: str
     to: str
     camera: str
@@ -54,8 +55,9 @@ def command(arguments: Arguments) -> int:
     names = perceived() if every else [one.partition("@")[0] for one in settings.perturb.split("+")]
     wanted = [kind_of(name) for name in names]
     check_pictures()
-    pool = holder(settings.pool, settings.id)
-    row = check_row(chosen(pool, settings.id))
+    name = identified(settings.pool, settings.id, settings.index)
+    pool = holder(settings.pool, name)
+    row = check_row(chosen(pool, name))
     cameras = cameras_of(row.embodiment)
     if settings.camera not in cameras:
         raise UnknownName("camera", settings.camera, cameras)

@@ -6,7 +6,7 @@ from ...ood.analysis.redraw import task_of
 from ...pictures.view import check_display, view
 from ...samplers.task_files import search_path
 from ...validate.playable import check_row
-from . import OK, Arguments, chosen, holder
+from . import OK, Arguments, chosen, holder, identified
 from .settings import read
 
 
@@ -15,14 +15,16 @@ class ViewSettings:
     """Settings of `scengen show view`; conf/command/show_view.yaml explains them."""
 
     pool: str | list[str]
-    id: str
+    id: str | None
+    index: int | None
     replay: bool
 
 
 def command(arguments: Arguments) -> int:
     settings = read("show view", arguments, ViewSettings)
-    pool = holder(settings.pool, settings.id)
-    row = chosen(pool, settings.id)
+    name = identified(settings.pool, settings.id, settings.index)
+    pool = holder(settings.pool, name)
+    row = chosen(pool, name)
     scenario = task_of(pool, search_path(arguments)).scenario(row.params)
     check_display()
     check_row(row)

@@ -27,6 +27,7 @@ from ...runs.progress import ProgressBar
 from ...samplers.task import Task
 from ...samplers.task_files import search_path
 from ...samplers.task_files import tasks as list_tasks
+from ...validate.verify.claims import of_another_version
 from ...validate.verify.examine import Verdict
 from ...validate.verify.junit import junit
 from ...validate.verify.pools import LIMITS, Options, Report, verify
@@ -43,6 +44,8 @@ ALL = "all"
 """Value of `task` for all tasks."""
 MAX_PRINTED = 20
 """Largest number of differences and faults to print; the files hold all."""
+ANY = "any"
+"""Value of `mujoco` for a pool that another MuJoCo may have certified."""
 SKIP = "skip"
 """Value of `others` for a run that checks only its sample."""
 OTHERS = ("check", SKIP)
@@ -64,6 +67,7 @@ class VerifySettings:
     level: str
     sample: int | None
     others: str
+    mujoco: str | None
     seed: int | None
     ycb: str | None
     apart: str | list[str] | None
@@ -82,6 +86,9 @@ def command(arguments: Arguments) -> int:
     for name, known in (("level", LEVELS), ("others", OTHERS)):
         if getattr(settings, name) not in known:
             raise BadConfig(f"{name} = {getattr(settings, name)}; it must be {' or '.join(known)}")
+    if settings.mujoco not in (None, ANY):
+        told = f"mujoco = {cut(settings.mujoco)}; it must be {ANY}, for this MuJoCo, whichever one certified the pool"
+        raise BadConfig(f"{told}; scengen verify mujoco compares a pool under several versions")
     if tasks:
         return _reproduce(tasks[-1], settings, search_path(arguments))
     if settings.others == SKIP and settings.sample is None:
@@ -90,7 +97,7 @@ def command(arguments: Arguments) -> int:
     try_file(settings.json)
     try_file(settings.junit)
     if settings.hits is not None:
-        for name in ("sample", "ycb", "apart", "json", "junit"):
+        for name in ("sample", "mujoco", "ycb", "apart", "json", "junit"):
             if getattr(settings, name) is not None:
                 raise BadConfig(f"{name} is not for hits: leave it out")
         return _replay_hits(settings.hits, settings.pool, search_path(arguments))
@@ -107,7 +114,7 @@ def command(arguments: Arguments) -> int:
 
 @contextmanager
 def _reported(settings: VerifySettings) -> Iterator[dict[str, Report | str]]:
-    """Reports by pool, which become the file for CI systems. An error is the report of the pool in which it occurred.
+    """Reports by pool, which become the files. An error is the report of the pool in which it occurred.
 
     A pool that is not verified yet has an empty report.
     """
@@ -119,8 +126,13 @@ def _reported(settings: VerifySettings) -> Iterator[dict[str, Report | str]]:
         reports[next((pool for pool, report in reports.items() if not report), given)] = str(error)
         raise
     finally:
-        if settings.junit and all(reports.values()) and reports:
-            write(Path(settings.junit), junit(reports, settings.level))
+        if reports and all(reports.values()):
+            if settings.junit:
+                write(Path(settings.junit), junit(reports, settings.level))
+            if settings.json:
+                plain = {folder: _plain(report) for folder, report in reports.items()}
+                alone = len(plain) == 1 and not isinstance(settings.pool, list)
+                write_json(settings.json, next(iter(plain.values())) if alone else plain)
 
 
 def _verify_pools(
@@ -152,6 +164,7 @@ def _verify_pools(
         settings.workers,
         limits,
         attacked,
+        settings.mujoco == ANY,
     )
     found: dict[str, Report] = {}
     for folder in folders:
@@ -161,17 +174,16 @@ def _verify_pools(
             report = verified(pool, options, search, progress_bar.show)
         reports[folder] = found[folder] = _with_scans(report, pool, settings.ycb)
         _print_report(pool, found[folder])
-    if settings.json:
-        plain = {folder: _plain(report) for folder, report in found.items()}
-        write_json(settings.json, plain[folders[0]] if len(folders) == 1 else plain)
     verdicts = Counter(report.verdict for report in found.values())
     if len(folders) > 1:
         say(f"{len(folders)} pools: {', '.join(f'{verdicts[v]} {v}' for v in STATUS)}")
     return next(status for verdict, status in WORST.items() if verdicts[verdict])
 
 
-def _plain(report: Report) -> dict[str, object]:
-    """A report as plain data."""
+def _plain(report: Report | str) -> dict[str, object]:
+    """A report as plain data, or the error because of which there is none."""
+    if isinstance(report, str):
+        return {"error": report}
     return {key: value for key, value in vars(report).items() if key != "names"}
 
 
@@ -200,7 +212,7 @@ def _with_hits(report: Report, pool: Pool, task: Task, limits: Limits) -> Report
     """The report on a pool. If the pool is sound so far, faults of the attack in its manifest are added."""
     if report.verdict != "sound" or pool.manifest.attack is None:
         return report
-    verdict: Verdict = "refuted" if pool.manifest.task_version == task.version else "declined"
+    verdict: Verdict = "declined" if of_another_version(pool.manifest, task) else "refuted"
     try:
         found = apart(_wrong_hits, (pool, stored_task(pool, task)), limits, "replaying the hits of its attack")
     except WorkerDied as error:
@@ -243,7 +255,7 @@ def _reproduce(chosen: str, settings: VerifySettings, search: Sequence[str]) -> 
         BadConfig: a setting is given that is for pools.
         UnknownName: there is no such task.
     """
-    for name in ("pool", "hits", "results", "sample", "ycb", "apart", "junit"):
+    for name in ("pool", "hits", "results", "sample", "mujoco", "ycb", "apart", "junit"):
         if getattr(settings, name) is not None:
             raise BadConfig(
                 f"{name} is for pools; task={chosen} compares tasks with their stored behaviour: leave it out"
@@ -317,7 +329,7 @@ def _audit_results(folder: Path, settings: VerifySettings, search: Sequence[str]
     Raises:
         BadConfig: a setting is for pools alone, or the folder holds no results.
     """
-    for name in ("hits", "ycb", "apart", "junit"):
+    for name in ("hits", "mujoco", "ycb", "apart", "junit"):
         if getattr(settings, name) is not None:
             raise BadConfig(f"{name} is not for results: leave it out")
     sample = None if settings.level == "full" else settings.sample or SAMPLE
@@ -360,7 +372,7 @@ def _replay_demonstrations(folders: Sequence[str], settings: VerifySettings, sea
     """
     if others := set(demonstration_folders(settings.pool or "")) - set(folders):
         raise BadConfig(f"{min(others)} holds no demonstrations; verify pools and demonstrations separately")
-    for name in ("sample", "ycb", "junit"):
+    for name in ("sample", "mujoco", "ycb", "junit"):
         if getattr(settings, name) is not None:
             raise BadConfig(f"{name} is for pools; demonstrations are all replayed: leave it out")
     every, reports = [Demonstrations.open(folder) for folder in folders], []
@@ -428,7 +440,7 @@ def _print_report(pool: Pool, report: Report) -> None:
             (report.rechecked, "checked again without an oracle"),
             (report.certified_again, "certified again"),
             (report.left_out, "left out and certified again"),
-            (report.claimed, "claimed against another version of the task"),
+            (report.claimed, "claimed for another version of the task or MuJoCo"),
             (report.drifted, "end in other bits"),
         )
         if n

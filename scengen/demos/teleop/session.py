@@ -31,6 +31,12 @@ RUNNING: Phase = "running"
 PAUSED: Phase = "paused"
 SETTLING: Phase = "settling"
 ENDED: Phase = "ended"
+LOST = "the pad is unplugged; plug it in and press start"
+"""Message of a take whose pad was unplugged."""
+MISSING = "there is no pad; plug one in and press start"
+"""Message of a take that starts without a pad."""
+RESUME = "press start, or enter on the keyboard"
+"""Message of such a take once there is a pad."""
 CONTROLS = f"""{ARM_CONTROLS}\
 B held: no motion (clutch)     Y: next arm     X: undo one second     start: pause, go on, keep     back: give up
 """
@@ -137,6 +143,8 @@ class Session:
         """Whether the person has left the take: it is kept, or given up."""
         self._actions: list[NDArray[np.float32]] = []
         self._grips = Grips(tuple(arm.grip for arm in self.world.arms))
+        self._met = False
+        """Whether the pad was there in a control period of this take."""
         self._settling = 0
         self._moments: list[_Moment] = []
         self._remember()
@@ -174,8 +182,11 @@ class Session:
         """Act on the buttons that are not for the arm."""
         if not self.pad[CONNECTED]:
             if self.phase in (RUNNING, READY):
-                self.phase, self.message = PAUSED, "the pad is unplugged; plug it in and press start"
+                self.phase, self.message = PAUSED, LOST if self._met else MISSING
             return
+        self._met = True
+        if self.message in (LOST, MISSING):
+            self.message = RESUME
         if "back" in pressed:
             self.given_up = self.finished = True
             self.phase = ENDED

@@ -188,9 +188,8 @@ def _requirements(order: Order) -> str:
     return (
         f"# {order.settings.train}: Python 3.12 or newer, in an environment without robosuite's requirements\n"
         f"lerobot[{order.recipe.extras}]=={LEROBOT}\n"
-        "scengen\n"
-        f"# For lerobot-eval, the robot's files: {INSTALL}\n"
-        "# and, from a checkout of scengen: pip install integrations/lerobot_env_scengen\n"
+        "# To play checkpoints, in a checkout of scengen: pip install . ./integrations/lerobot_env_scengen\n"
+        f"# and the robot's files: {INSTALL}\n"
     )
 
 

@@ -213,9 +213,9 @@ def _text(config: Mapping[str, Any]) -> str:
 def _requirements() -> str:
     return (
         f"# {NAME}: Python 3.11 or newer, in a separate environment. cmake builds its requirement egl_probe.\n"
-        f"robomimic=={ROBOMIMIC}\nscengen\n"
-        f"# To play checkpoints, the robot's files: {INSTALL}\n"
-        "# and, from a checkout of scengen: pip install integrations/robomimic_scengen\n"
+        f"robomimic=={ROBOMIMIC}\n"
+        "# To play checkpoints, in a checkout of scengen: pip install . ./integrations/robomimic_scengen\n"
+        f"# and the robot's files: {INSTALL}\n"
     )
 
 

@@ -26,7 +26,7 @@ if (found) {
   search();
 }
 addEventListener("keydown", event => {
-  if (event.key === "/" && !event.ctrlKey && !event.metaKey && !/^(INPUT|TEXTAREA|SELECT)$/.test(document.activeElement.tagName)) {
+  if (event.key === "/" && !event.ctrlKey && !event.metaKey && document.activeElement !== field) {
     event.preventDefault();
     field.focus();
   }

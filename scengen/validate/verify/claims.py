@@ -12,6 +12,7 @@ from ...certificate import CHECKS, Check, as_json, from_json
 from ...control.loop import ACTION, Loop
 from ...control.teleop import ALPHA, LARGEST_CHANGE, MOTION
 from ...errors import Infeasible, ScengenError, contrasted
+from ...installation import versions
 from ...params import canonical
 from ...pool import Pool, PoolRow
 from ...pool.files import sha256
@@ -34,8 +35,20 @@ ROUNDING = 1e-6
 
 
 class OfCode(str):
-    """Difference that rests on the code of the task. It is a fault only if the pool was certified on the version of the
-    task that is installed; otherwise the author's claim is about other code, and cannot be decided here."""
+    """Difference that rests on the code of the task, or on MuJoCo. It is a fault only if the pool was certified on the
+    installed versions of both; otherwise the author's claim is about other code, and cannot be decided here."""
+
+
+def of_another_version(manifest: Manifest, task: Task) -> str:
+    """The versions of the task and of MuJoCo as text, if a pool was certified for others; empty if it was not."""
+    told = task.other_version("certified against", manifest.task_version), of_another_mujoco(manifest)
+    return "; ".join(filter(None, told))
+
+
+def of_another_mujoco(manifest: Manifest) -> str:
+    """The versions of MuJoCo as text, if a pool was certified with another one; empty if it was not."""
+    made, here = manifest.versions["mujoco"], versions()["mujoco"]
+    return "" if made == here else f"certified with mujoco {made}, this is {here}"
 
 
 @dataclass(frozen=True)
@@ -64,8 +77,8 @@ class Claims:
 
     @property
     def of_another_version(self) -> str:
-        """The versions of the task as text, if the pool was certified on another one; empty if not."""
-        return self.task.other_version("certified against", self.manifest.task_version)
+        """The versions as text, see the function of this name."""
+        return of_another_version(self.manifest, self.task)
 
     @cached_property
     def design(self) -> Design:

@@ -8,14 +8,15 @@ from typing import Literal
 from ...errors import ScengenError
 from ...pool import PoolRow
 from ...pool.manifest import MANIFEST
-from ...work.fingerprint import fingerprint
+from ...work.fingerprint import same_bits
 from ..certify import Adversary
-from ..rebuilt import difference, rebuild
+from ..rebuilt import difference, other_physics, rebuild
 from . import survey
 from .claims import (
     Claims,
     OfCode,
     compiles,
+    of_another_mujoco,
     scene_or_nothing,
     wrong_certificate,
     wrong_hashes,
@@ -42,7 +43,7 @@ class Examination:
     """Whether its scene and its draw were made again."""
     simulated: bool = False
     claimed: bool = False
-    """Whether it is declined because it was certified against another version of the task, where something differs."""
+    """Whether it is declined because something differs under another version of the task or MuJoCo."""
     drifted: bool = False
     """Whether the replay reaches the goal, but ends in other bits than on the machine of the certificate."""
     seconds: float | None = None
@@ -122,8 +123,11 @@ class Examiner:
         reasons += [*wrong_names(row, scenario), *wrongly_drawn(row, claims)]
         reasons += (wrong_certificate if certified else wrong_rejection)(row, scenario, claims)
         text = rebuild(scenario) if compiles(row) else scene_or_nothing(scenario)
-        exact = row.certificate.fingerprint == fingerprint()
-        if other := difference(row.scene_xml, text, exact, row.embodiment):
+        if of_another_mujoco(claims.manifest):
+            other = other_physics(row.scene_xml, text, row.embodiment)
+        else:
+            other = difference(row.scene_xml, text, same_bits(row.certificate), row.embodiment)
+        if other:
             reasons.append(OfCode(other))
         if reasons or not simulated:
             return self._judged(row, reasons, True)

@@ -10,7 +10,7 @@ from ...errors import PoolError, contrasted, cut
 from ...installation import versions
 from ...pool.manifest import MANIFEST
 from ...samplers.task import Task
-from ...work.fingerprint import fingerprint
+from ...work.fingerprint import same_bits
 from .. import lock
 from ..settings import CertifySettings
 from .claims import Claims
@@ -42,8 +42,8 @@ class Report:
     failed: list[dict[str, str]]
     """`id`, `verdict` and `reason` of everything that is not sound; a fault of the whole pool under manifest.json."""
     claimed: int
-    """Number of scenarios that were certified against another version of the task, and that differ from it here. They
-    are among the declined ones."""
+    """Number of scenarios that were certified for another version of the task or MuJoCo, and that differ here. They are
+    among the declined ones."""
     versions: list[int]
     """Version of the task on which the pool was certified, and the installed one."""
     claimed_checks: list[str]
@@ -117,23 +117,30 @@ class Findings:
                 told = f"the settings are called {settings.name}, whose bound of the robust check is {bounds}"
                 self.of_pool(MANIFEST, "refuted", told)
 
-    def compare_versions(self, claims: Claims) -> None:
-        """Note the differences between what the pool was made with and this installation."""
+    def compare_versions(self, claims: Claims, any_mujoco: bool) -> None:
+        """Note the differences between what the pool was made with and this installation.
+
+        Args:
+            any_mujoco: see `pools.Options`.
+        """
         manifest = claims.manifest
         for package, made in manifest.versions.items():
             here = versions().get(package)
-            if package in ("mujoco", "robosuite") and made != here:
-                told = f"certified with {package} {made}, this is {here}: this installation cannot judge it"
+            if package == "mujoco" and made != here and not any_mujoco:
+                told = f"certified with mujoco {made}, this is {here}; mujoco=any checks what holds here"
                 self.of_pool(MANIFEST, "declined", told)
-            elif made != here:
+            elif package == "robosuite" and made != here:
+                told = f"certified with robosuite {made}, this is {here}: this installation cannot judge it"
+                self.of_pool(MANIFEST, "declined", told)
+            elif package != "mujoco" and made != here:
                 self.remarks.append(f"certified with {package} {made}, this is {here}")
         self.task_versions = [manifest.task_version, claims.task.version]
         made = [check for check in CHECKS if check != "attack" or claims.settings.attack]
         self.claimed_checks = [check for check in made if check not in MADE_AGAIN[self.level]]
         if other := claims.of_another_version:
             self.remarks.append(f"{other}: what differs between the versions cannot be checked here")
-        if manifest.fingerprint != fingerprint():
-            told = "certified on a machine with different rounding: final states and numbers are not compared"
+        if not same_bits(manifest):
+            told = "certified with different rounding: final states and numbers are not compared"
             self.remarks.append(told)
 
     def compare_lock(self, folder: Path, claims: Claims) -> None:

@@ -12,12 +12,12 @@ from ...errors import PoolError, ScengenError, cut
 from ...pool import Pool, PoolRow
 from ...pool.manifest import MANIFEST, PROCESS, Manifest
 from ...samplers.task import Task
-from ...work.fingerprint import fingerprint
+from ...work.fingerprint import same_bits
 from ...work.parallel import Limits, Workers, each
 from ..certify import Adversary
 from ..settings import CertifySettings
 from . import survey
-from .claims import Claims, OfCode
+from .claims import Claims, OfCode, of_another_version
 from .examine import Answer, Examination, Examiner, Failed, Job, LeftOut, lost_examination
 from .findings import Findings, Report
 from .spot import excluded_share
@@ -48,6 +48,8 @@ class Options:
     """Limits of one scenario; None to work in this process."""
     adversary: Adversary | None = None
     """The adversary at level full, if the certificates require an attack; see `certify.certify`."""
+    any_mujoco: bool = False
+    """Whether a pool that another MuJoCo certified is judged. Bits are not compared, and what differs is declined."""
 
 
 def verify(
@@ -67,7 +69,7 @@ def verify(
     found = Findings(options.level, pool.sha256)
     for name, what in pool.damaged().items():
         found.of_pool(name, "refuted", f"the shard {what}")
-    other = installed.other_version("certified against", pool.manifest.task_version)
+    other = of_another_version(pool.manifest, installed)
     try:
         settings = settings_of_manifest(pool.manifest)
     except (ScengenError, ArithmeticError, MemoryError, RecursionError) as error:
@@ -82,7 +84,7 @@ def verify(
         return found.report()
     found.compare_tasks(installed, task)
     found.name_settings(settings, levels)
-    found.compare_versions(claims)
+    found.compare_versions(claims, options.any_mujoco)
     found.compare_lock(pool.folder, claims)
     if found.pool_verdict != "declined":
         run = _Run(pool, options, found, _sample(pool, options, found), claims.of_another_version)
@@ -239,7 +241,7 @@ class _Run:
         if certified := sum(not why for why in reasons.values()):
             told = f"{certified} of {len(left_out)} scenarios that the run left out are certified here"
             self.found.remarks.append(told)
-        if len(reasons) == len(left_out) and self.manifest.fingerprint == fingerprint() and not self.other_version:
+        if len(reasons) == len(left_out) and same_bits(self.manifest) and not self.other_version:
             for what in survey.wrong_losses(self.manifest, reasons):
                 self.found.of_pool(MANIFEST, "refuted", what)
 

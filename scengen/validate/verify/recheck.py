@@ -10,7 +10,7 @@ from ...errors import NoOracle, ScengenError, contrasted
 from ...pool import PoolRow
 from ...pool.manifest import without_numbers
 from ...scenario import Scenario
-from ...work.fingerprint import fingerprint
+from ...work.fingerprint import same_bits
 from ..certify import Adversary, Trial, certify
 from ..rollout import Rollout, replay
 from ..settings import CertifySettings
@@ -62,7 +62,7 @@ def simulate(
         level: one of `LEVELS`.
         adversary: see `certify`.
     """
-    same_rounding = row.certificate.fingerprint == fingerprint()
+    same_rounding = same_bits(row.certificate)
     trial = Trial(scenario, row.horizon, settings, row.embodiment)
     trial.text = text
     stored = {check.name: check for check in row.certificate.checks}
@@ -91,7 +91,7 @@ def fails_again(
         level: `recheck` repeats the checks without an oracle as far as they were made, `full` all of them.
         adversary: see `certify`.
     """
-    if level == "replay" or row.certificate.fingerprint != fingerprint():
+    if level == "replay" or not same_bits(row.certificate):
         return
     last = None if level == "full" else BEFORE_WITNESS[-1]
     faults: list[str] = []
@@ -118,7 +118,7 @@ def _other_reject(row: PoolRow, again: Sequence[Check], last: str | None) -> Ite
 
 
 def certified_here(row: PoolRow, claims: Claims, adversary: Adversary | None) -> str:
-    """Result of a scenario that was certified against another version of its task, under the installed one.
+    """Result of a scenario that was certified for another version of its task or MuJoCo, for the installed ones.
 
     Args:
         adversary: see `certify`.
@@ -128,8 +128,8 @@ def certified_here(row: PoolRow, claims: Claims, adversary: Adversary | None) ->
         scenario = task.scenario(row.params, row.split)
         again = certify(scenario, task.horizon, claims.settings, task.embodiment, adversary=adversary).certificate
     except (ScengenError, ValueError, ArithmeticError) as error:
-        return f"certified again against version {task.version} it cannot be: {' '.join(str(error).split())[:200]}"
-    return f"certified again against version {task.version} it is {again.verdict} {again.reason}".strip()
+        return f"certified again here it cannot be: {' '.join(str(error).split())[:200]}"
+    return f"certified again here it is {again.verdict} {again.reason}".strip()
 
 
 def why_not_certified(index: int, claims: Claims, adversary: Adversary | None) -> str:
