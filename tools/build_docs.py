@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
 import baselines_page
+import perturb_page
 import predictors
 import tables
 
@@ -43,7 +44,7 @@ FILLS: Mapping[str, Callable[[], Mapping[str, str]]] = {
     "drift": tables.drift,
     "kept_cheats": tables.kept_cheats,
     "paper": tables.paper,
-    "perturb": tables.perturb,
+    "perturb": perturb_page.fills,
     "predictors": predictors.fills,
     "view": tables.warp,
 }

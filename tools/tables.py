@@ -21,7 +21,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "attack"))
 import mutation_score
 import recall
 from hand import Hand
-from scipy.stats import binomtest
 from test_hands import HANDS
 
 from scengen import list_tasks, load_task
@@ -29,7 +28,6 @@ from scengen.attack.campaign import GRAMMAR
 from scengen.attack.evidence import TierRate
 from scengen.drift.matrix import FLIPPED, OUTCOMES, UNKNOWN, cell, flips, total
 from scengen.episode import PAPER, STRICT
-from scengen.evaluate.statistics import wilson
 from scengen.evidence import ledger
 from scengen.evidence.ledger import Evidence
 from scengen.measures import figures
@@ -37,8 +35,6 @@ from scengen.measures.figures import table
 from scengen.measures.policies import POLICIES
 from scengen.ood.analysis.leaks import SEARCH
 from scengen.ood.baseline import INCONCLUSIVE
-from scengen.perturb.perturbation import NONE as CLEAN
-from scengen.samplers.conditions import KINDS
 from scengen.samplers.split import ID
 from scengen.samplers.task import Task
 
@@ -197,52 +193,6 @@ def warp() -> dict[str, str]:
             cells = (str(found[name]) for name in ("n", "goals", "verdicts", "near"))
             lines.append([link(found["task"]), *cells, f"{1000 * found['median']:g}"])
     return {"warp": table(AGREEMENT, lines)}
-
-
-def perturb() -> dict[str, str]:
-    """The tables of docs/perturb.md."""
-    return {"control": _control(), "disturbed": _disturbed()}
-
-
-def _disturbed() -> str:
-    """Scenarios that small policies solve under perturbations of their readings, with the paired difference."""
-    rows = [(task, row) for task in list_tasks() for row in ledger.newest("disturbed", task)]
-    asked = list(dict.fromkeys(condition for _, row in rows for condition in row.value))
-    lines = [
-        [link(task), f"{row.n}{ledger.mark(row)}", *(_solved(row.value, condition) for condition in asked)]
-        for task, row in rows
-    ]
-    return table(("task", "n", *(f"`{condition}`" if condition != CLEAN else "clean" for condition in asked)), lines)
-
-
-def _solved(value: Mapping[str, Any], condition: str) -> str:
-    """Percent solved with its 95 % interval; a star where the paired difference from the clean run is significant."""
-    if condition not in value:
-        return NONE
-    clean, own = (dict(map(tuple, value[each]["outcomes"])) for each in (CLEAN, condition))
-    worse, better = (sum(clean[k] == is_lost != own[k] for k in own) for is_lost in (True, False))
-    share = value[condition]["solved"] / len(own)
-    low, high = wilson(share, len(own))
-    is_clear = worse + better > 0 and binomtest(worse, worse + better).pvalue < 0.05
-    return f"{share:.0%} [{low:.0%}, {high:.0%}]{'*' if is_clear else ''}"
-
-
-def _control() -> str:
-    """Conditions of control that each task bears: for each kind the scenarios certified at levels 1 to 5."""
-    lines = []
-    for task in list_tasks():
-        row = next(iter(ledger.newest("control", task)), None)
-        cells = [_borne(row.value[kind]) if row else ledger.not_measured(task) for kind in KINDS]
-        lines.append([link(task), f"{row.n}{ledger.mark(row)}" if row else NONE, *cells])
-    return table(("task", "scenarios", *(f"`{kind}`" for kind in KINDS)), lines)
-
-
-def _borne(figures: Mapping[str, Any]) -> str:
-    """The cell of a kind: certified scenarios by level, with a star where solutions end in the usual bits."""
-    return " ".join(
-        f"{count}{'*' if level in figures['without_effect'] else ''}"
-        for level, count in enumerate(figures["certified"], 1)
-    )
 
 
 def _drifted(versions: Sequence[str], rows: Sequence[Evidence]) -> str:

@@ -1,11 +1,12 @@
 """A small policy that sees: behaviour cloning of two cameras and the robot's own pose with PyTorch.
 
-    python picture_policy.py collect DEMONSTRATIONS FRAMES [processes]    # play demonstrations and take pictures
+    python picture_policy.py collect DEMONSTRATIONS FRAMES [processes] [looks]    # play demonstrations, take pictures
     python picture_policy.py train FRAMES WEIGHTS.pt [minutes]
 
 `scengen evaluate policy=picture_policy:make_policy` plays it, see README.md. Rows have 25 Hz. The network (four
 convolutions and a spatial softmax for each camera, a head of two layers) gets the pictures and the pose of now and of
-the row before, and gives the next `CHUNK` actions, of which `PLAYED` are played.
+the row before, and gives the next `CHUNK` actions, of which `PLAYED` are played. With `looks`, each demonstration is
+filmed clean and so many times more, each time under the next perturbation of `MIXTURE`.
 """
 
 import multiprocessing
@@ -23,7 +24,11 @@ from scengen.envs.observations import cameras_of, streams_of
 from scengen.export.replay import Snapshot, WitnessReplay
 from scengen.export.sources import open_source
 from scengen.look.looks import ROOM
-from scengen.pictures.render import Camera
+from scengen.perturb.kinds import LEVELS, kinds
+from scengen.perturb.language import Words
+from scengen.perturb.perturbation import Perturbation
+from scengen.pictures.render import Camera, Picture
+from scengen.pool.row import SceneRow
 from scengen.validate.playable import stored_world
 
 CAMERAS = ("rgb_exo_right_cam", "rgb_gripper_cam")
@@ -38,40 +43,75 @@ CHUNK = 8
 """Number of actions that the network predicts."""
 PLAYED = 4
 """Number of them that are played before it looks again."""
+MIXTURE = (
+    ("light_direction", "camera_position", "noise"),
+    ("light_intensity", "table_texture", "wrist_camera"),
+    ("light_colour", "camera_angle", "blur"),
+    ("ambient", "table_colour", "distractors"),
+    ("shadow", "camera_fov", "compression"),
+    ("room_colour", "exposure", "patch"),
+    ("thing_colour", "dropped", "proprioception_bias"),
+    ("thing_texture", "late", "proprioception_noise"),
+)
+"""Kinds that a film joins: each kind of what this policy reads once."""
 FLOOR = np.array([1e-3] * 3 + [8.7e-3] * 4 + [1e-3] * 2, np.float32)
 """Smallest standard deviation of the entries of the pose: 1 mm, and 0.5 deg as an entry of a quaternion."""
 
 
-def collect(demonstrations: str, to: str, processes: str = "1") -> None:
-    """Play all demonstrations of a folder and store pictures, poses and actions of each as `.npz`."""
+def collect(demonstrations: str, to: str, processes: str = "1", looks: str = "0") -> None:
+    """Play all demonstrations of a folder and store pictures, poses and actions of each film as `.npz`."""
     Path(to).mkdir(parents=True, exist_ok=True)
     count = len(open_source(demonstrations))
-    jobs = [(demonstrations, to, first, int(processes)) for first in range(int(processes))]
+    jobs = [(demonstrations, to, int(looks), first, int(processes)) for first in range(int(processes))]
     with multiprocessing.get_context("spawn").Pool(int(processes)) as workers:
         workers.starmap(_collect, jobs)
-    print(f"{len(list(Path(to).glob('*.npz')))} of {count} demonstrations in {to}")
+    print(f"{len(list(Path(to).glob('*.npz')))} films of {count} demonstrations in {to}")
 
 
-def _collect(demonstrations: str, to: str, first: int, step: int) -> None:
+def look_of(number: int, look: int, words: Words) -> Perturbation:
+    """The perturbation of a film: none in look 0, then a part of `MIXTURE` without the kinds that the task lacks."""
+    if look == 0:
+        return Perturbation(())
+    turn = number + look
+    level = 1 + turn // len(MIXTURE) % LEVELS
+    joined = [name for name in MIXTURE[turn % len(MIXTURE)] if not kinds()[name].lacks(words)]
+    return Perturbation(tuple((name, level) for name in joined))
+
+
+def _collect(demonstrations: str, to: str, looks: int, first: int, step: int) -> None:
     for number, row in enumerate(open_source(demonstrations).rows()):
-        if number % step != first:
-            continue
-        world, scenario = stored_world(row, ROOM), load_task(row.task).scenario(row.params)
-        camera, views = Camera(world, SIZE, SIZE), cameras_of(row.embodiment)
-        streams = {name: streams_of(row.embodiment)[name] for name in POSE}
-
-        def observe(world=world, streams=streams, camera=camera, views=views, held=scenario.orientation) -> Snapshot:
-            return Snapshot.of(world, streams, lambda: {name: held.apply(camera.take(views[name])) for name in CAMERAS})
-
-        rows = list(WitnessReplay(row, scenario, world, PERIODS, observe).rows())
-        camera.close()
-        if rows[-1].success:
-            np.savez(
-                Path(to, f"{number:05d}.npz"),
-                pictures=np.array([[r.observed.pictures[name] for name in CAMERAS] for r in rows]),
-                pose=np.array([np.concatenate([r.observed.streams[name] for name in POSE]) for r in rows]),
-                actions=np.array([r.action for r in rows]),
+        for look in range(looks + 1) if number % step == first else ():
+            _film(
+                row,
+                look_of(number, look, Words.of(row.task, row.instruction)),
+                look,
+                Path(to, f"{number:05d}-{look}.npz"),
             )
+
+
+def _film(row: SceneRow, perturbation: Perturbation, seed: int, path: Path) -> None:
+    """Play a demonstration, and store what is perceived of it if it reaches its goal."""
+    world, scenario = stored_world(row, perturbation.dressed(ROOM)), load_task(row.task).scenario(row.params)
+    senses = perturbation.senses(world.model, row.id, row.task, row.instruction, seed)
+    camera, views = Camera(world, SIZE, SIZE), cameras_of(row.embodiment)
+    streams = {name: streams_of(row.embodiment)[name] for name in POSE}
+
+    def pictures() -> dict[str, Picture]:
+        taken = {name: scenario.orientation.apply(camera.take(views[name])) for name in CAMERAS}
+        return {name: senses.picture(views[name], world.time, picture) for name, picture in taken.items()}
+
+    def observe() -> Snapshot:
+        return Snapshot.of(world, streams, pictures, senses)
+
+    rows = list(WitnessReplay(row, scenario, world, PERIODS, observe).rows())
+    camera.close()
+    if rows[-1].success:
+        np.savez(
+            path,
+            pictures=np.array([[r.observed.pictures[name] for name in CAMERAS] for r in rows]),
+            pose=np.array([np.concatenate([r.observed.streams[name] for name in POSE]) for r in rows]),
+            actions=np.array([r.action for r in rows]),
+        )
 
 
 class Eye(nn.Module):
@@ -119,8 +159,8 @@ def train(frames: str, weights: str, minutes: str = "5") -> None:
     torch.manual_seed(0)
     device = "cuda" if torch.cuda.is_available() else "cpu"
     pictures, pose, actions, rows, held_out = [], [], [], [], []
-    for number, path in enumerate(sorted(Path(frames).glob("*.npz"))):
-        found, first = np.load(path), sum(map(len, pose))
+    for path in sorted(Path(frames).glob("*.npz")):
+        found, first, number = np.load(path), sum(map(len, pose)), int(path.stem.partition("-")[0])
         length = len(found["pose"])
         pictures.append(torch.from_numpy(found["pictures"]))
         pose.append(found["pose"])
@@ -188,8 +228,9 @@ class Policy:
 
     def act(self, observation) -> np.ndarray:
         """The next action of the chunk; a new chunk after `PLAYED` of them."""
-        now = self._seen(observation)
-        before, self.before = self.before or now, now
+        if len(self.queue) <= 1:
+            now = self._seen(observation)
+            before, self.before = self.before or now, now
         if not self.queue:
             pictures, pose = (
                 torch.from_numpy(np.stack(pair)).to(self.device)[None] for pair in zip(before, now, strict=True)
@@ -197,6 +238,10 @@ class Policy:
             with torch.no_grad():
                 self.queue = list(self.network(pictures, pose)[0, :PLAYED].float().cpu().numpy())
         return np.clip(self.queue.pop(0), -1.0, 1.0)
+
+    def looks(self) -> bool:
+        """Whether the next `act` uses pictures: it gives a new chunk, or the next one does."""
+        return len(self.queue) <= 1
 
     def _seen(self, observation) -> tuple[np.ndarray, np.ndarray]:
         margin = (SIZE - CROP) // 2

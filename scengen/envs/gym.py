@@ -15,11 +15,13 @@ import warnings
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, wraps
 from typing import Any, NamedTuple, ParamSpec
 
 import gymnasium
+import mujoco
 import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
@@ -428,7 +430,8 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self.render_mode is None:
             return None
         with self._lock:
-            return self._picture(cameras_of(self.task.embodiment).get(self.camera, self.camera))
+            camera = cameras_of(self.task.embodiment).get(self.camera, self.camera)
+            return self._picture(camera, self._shown(camera))
 
     def close(self) -> None:
         """Free the renderer."""
@@ -538,18 +541,23 @@ class PoolEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _observe(self) -> Observation:
         read = {name: clipped(self._perceived(name, s.read(self.world)), s.bound) for name, s in self.streams.items()}
-        return {**read, **{name: self._picture(camera) for name, camera in self.observed.cameras.items()}}
+        return {**read, **{name: self._picture(c, self._shown(c)) for name, c in self.observed.cameras.items()}}
 
     def _perceived(self, name: str, reading: NDArray[np.float64]) -> NDArray[np.float64]:
         """A reading of a stream under the perturbation, if there is one."""
         return self._senses.reading(name, self.metadata["names"][name], self.world.time, reading)
 
-    def _picture(self, camera: str) -> NDArray[np.uint8]:
+    def _shown(self, camera: str) -> mujoco.MjData:
+        """Data of the world that a camera shows: of a late one of an earlier moment. To be called in each step."""
+        data = self.world.data
+        return self._senses.arriving(camera, self.world.time, copy(data)) if self.drawn.delay else data
+
+    def _picture(self, camera: str, shown: mujoco.MjData) -> NDArray[np.uint8]:
         start = time.perf_counter()
         if self._renderer is None:
             self._renderer = Camera(self.world, self.observed.width, self.observed.height)
-        picture = self._scenario.orientation.apply(self._renderer.take(camera)).copy()
-        seen = self._senses.picture(camera, self.world.time, picture)
+        picture = self._scenario.orientation.apply(self._renderer.take(camera, shown)).copy()
+        seen = self._senses.arrived(camera, self.world.time, picture)
         self.drawing = Drawing(self.drawing.pictures + 1, self.drawing.seconds + time.perf_counter() - start)
         return seen
 

@@ -141,7 +141,7 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         Args:
             actions: shape (num_envs, size of an action).
             draw: slots whose pictures are drawn, shape (num_envs,), so that unused pictures take no time. All others
-                are black, except those of a new episode and of cameras that are late. None for all slots.
+                are black, except those of a new episode. None for all slots.
 
         Raises:
             ValueError: the actions have another shape, or one is not finite. Nothing is simulated then.
@@ -314,7 +314,8 @@ class PoolVectorEnv(VectorEnv[dict[str, Reading], NDArray[np.float32], NDArray[A
         for read, readings in self._reads[slot]:
             readings[slot] = read(world)
         for name, camera in env.observed.cameras.items():
-            self._pictures[name][slot] = env._picture(camera) if self._draws[slot] or env.drawn.delay else 0
+            shown = env._shown(camera)
+            self._pictures[name][slot] = env._picture(camera, shown) if self._draws[slot] else 0
 
     def _observed(self) -> dict[str, Reading]:
         """The observations after the last steps, as new arrays."""

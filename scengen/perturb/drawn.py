@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import mujoco
 import numpy as np
@@ -16,6 +16,8 @@ from ..samplers.keyed import unit
 from .effects import OBJECTS, Effect, Picture, Reading, Values, number_in
 from .kinds import affects, kinds, stream_kind
 from .language import WORDINGS, Words
+
+Taken = TypeVar("Taken")
 
 HEADLIGHT = "vis_headlight_"
 """Beginning of the names of the colours of the light at the camera."""
@@ -137,22 +139,26 @@ class Senses:
 
     def __init__(self, drawn: Drawn):
         self.drawn = drawn
-        self.taken: dict[str, list[tuple[float, Picture]]] = {}
-        """Time [s] and picture of what has been taken and may still arrive, by camera."""
+        self.taken: dict[str, list[tuple[float, Any]]] = {}
+        """Time [s] and picture, or data of the world, of what has been taken and may still arrive, by camera."""
 
     def picture(self, camera: str, time: float, picture: Picture) -> Picture:
-        """What arrives when a picture is taken: of a late camera the newest that is old enough, or the first.
+        """What is perceived when a picture is taken. `camera` is robosuite's name; `time` of the simulation in s."""
+        return self.arrived(camera, time, self.arriving(camera, time, picture))
 
-        Args:
-            camera: robosuite's name.
-            time: time of the simulation [s].
-        """
-        if self.drawn.delay:
-            taken = [each for each in self.taken.get(camera, []) if each[0] < time]
-            taken.append((time, picture))
-            while len(taken) > 1 and taken[1][0] <= time - self.drawn.delay + 1e-9:
-                del taken[0]
-            self.taken[camera], picture = taken, taken[0][1]
+    def arriving(self, camera: str, time: float, taken: Taken) -> Taken:
+        """What arrives when something is taken: of a late camera the newest that is old enough, or the first."""
+        if not self.drawn.delay:
+            return taken
+        every = [each for each in self.taken.get(camera, []) if each[0] < time]
+        every.append((time, taken))
+        while len(every) > 1 and every[1][0] <= time - self.drawn.delay + 1e-9:
+            del every[0]
+        self.taken[camera] = every
+        return every[0][1]
+
+    def arrived(self, camera: str, time: float, picture: Picture) -> Picture:
+        """A picture that arrives, as it is perceived."""
         return self.drawn.on_picture(picture, camera, _period(time))
 
     def reading(self, stream: str, entries: Sequence[str], time: float, reading: Reading) -> Reading:

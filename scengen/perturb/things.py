@@ -21,7 +21,9 @@ OTHER_HUE = 50.0
 FAR = 45.0
 """Distance in CIELAB from the present colour from which on another one is taken at once."""
 TRIES = 100
-"""Number of colours that are tried."""
+"""Number of colours that are tried at once."""
+ROUNDS = 20
+"""Largest number of rounds of `TRIES`; the next one is tried if none of its colours is clear."""
 SHARES = np.linspace(0.0, 1.0, 41)[1:, None]
 """Shares of another colour at which it must be clear of others, shape (n, 1)."""
 HIDDEN_GROUP = 3
@@ -113,12 +115,15 @@ class _Clear:
         """Another colour for things, shape (3,): the first clear one that is `FAR`, or the farthest clear one, or the
         present one if none is clear."""
         best, farthest, before = np.array(rgb), 0.0, lab(rgb)
-        for target in rng.uniform(0.05, 0.95, (TRIES, 3)):
-            far = float(np.linalg.norm(lab(target) - before))
-            if far > farthest and self._is_clear(rgb, lab(_mixed(np.array(rgb), target, SHARES))):
-                best, farthest = target, far
-                if far >= FAR:
-                    break
+        for _ in range(ROUNDS):
+            for target in rng.uniform(0.05, 0.95, (TRIES, 3)):
+                far = float(np.linalg.norm(lab(target) - before))
+                if far > farthest and self._is_clear(rgb, lab(_mixed(np.array(rgb), target, SHARES))):
+                    best, farthest = target, far
+                    if far >= FAR:
+                        break
+            if farthest:
+                break
         self._ways[rgb] = lab(_mixed(np.array(rgb), best, SHARES))
         return best
 

@@ -85,8 +85,11 @@ class Camera:
             self.frame()
         return name or self._view  # type: ignore[return-value]
 
-    def take(self, name: str | None = None) -> Picture:
-        """A picture of the present world, from a named camera or in the view that was chosen last.
+    def take(self, name: str | None = None, data: mujoco.MjData | None = None) -> Picture:
+        """A picture from a named camera, or in the view that was chosen last.
+
+        Args:
+            data: a copy of the world's data at an earlier moment; None for the present world.
 
         Raises:
             UnknownName: there is no such camera.
@@ -94,7 +97,7 @@ class Camera:
         cameras = [self.world.model.camera(i).name for i in range(self.world.model.ncam)]
         if name is not None and name not in cameras:
             raise UnknownName("camera", name, cameras)
-        model, data, eye = self.world.model, self.world.data, self._eye(name)
+        model, data, eye = self.world.model, data or self.world.data, self._eye(name)
         with self._lock:
             mujoco.mj_camlight(model, data)  # after the control loop they are one physics step late
             self._renderer.update_scene(data, camera=eye, scene_option=self._options)

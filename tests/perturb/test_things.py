@@ -156,3 +156,12 @@ def test_colours_and_prints_of_the_same_things_are_refused():
 def test_things_of_an_unknown_task_are_refused():
     with pytest.raises(BadConfig, match="thing_colour: give words="):
         Perturbation.parse("thing_colour@1").of("a").on_model(loaded("domino_single"))
+
+
+def test_another_colour_is_found_where_few_are_clear():
+    """One colour of fifty is clear of the other things of this task."""
+    model, words = loaded("seesaw_balance"), words_of("seesaw_balance")
+    own = free_geoms(model, words.free)
+    for seed in range(24):
+        with drawn("seesaw_balance", "thing_colour", seed=seed).while_applied(model) as changed:
+            assert {*own} <= {*changed["geom_rgba"].tolist()}, f"seed {seed} changes no colour"
