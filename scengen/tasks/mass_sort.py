@@ -37,7 +37,7 @@ from ..decisions import Decision, choice
 from ..geometry import UP, Outline, Vec3, corners, gap, least_gap
 from ..means import Mean, when
 from ..params import Bounded, param
-from ..predicates import borne, fallen, held, over, rests_on, still
+from ..predicates import fallen, held, over, rests_on, still
 from ..robots.jaw import OPEN_GAP, SPAN
 from ..scenario import (
     Action,
@@ -85,7 +85,7 @@ class Spot(Bounded):
 class MassSort(Scenario):
     """Three cubes in front of three zones."""
 
-    VERSION = 2
+    VERSION = 3
     HOLD = 0.3
 
     light: float = param(0.05, "kg", 0.02, 0.6, hidden=True)
@@ -133,12 +133,12 @@ class MassSort(Scenario):
         def released(world: World) -> bool:
             return any(self.zone_of(world, cube) is not None for cube in self.cubes)
 
-        def comes(world: World, cube: str) -> bool:
-            return any(self.within(world, cube, rank) for rank in range(CUBE_COUNT))
+        def stands(world: World, cube: str) -> bool:
+            return world.touching(cube, "table") and any(self.within(world, cube, k) for k in range(CUBE_COUNT))
 
         carried = {
-            f"the jaw carried the {place} cube into its zone": when(
-                partial(comes, cube=cube), lambda world, cube=cube: borne(world, world.arm, cube)
+            f"the jaw set the {place} cube down in its zone": when(
+                partial(stands, cube=cube), lambda world, cube=cube: world.arm.grips(cube)
             )
             for place, cube in zip(PLACES, self.cubes, strict=True)
         }
