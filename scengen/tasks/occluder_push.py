@@ -19,6 +19,7 @@ Decisions where the paper (App. B, T26) is silent:
 
 * Hidden means: no camera of the table sees any part of a cube. That is exact, not sampled: a flat lid hides a cube if
   its foot, projected from the camera onto the lid's underside, lies within the lid.
+* The jaw sets the red cube down on the patch: one that had only hung over it was pushed onto it (6 of 6).
 * No other cube stands on the patch, held or not. Otherwise a policy could bring cube after cube until one counts.
 * Chance: training has three places for the red cube; a policy that always uncovers the same one is right in a third.
 * The paper's axis stacks two or three lids more on the target. Here every cube gets as many, because a single pile
