@@ -18,8 +18,8 @@ Decisions where the paper is silent:
 * Left is the robot's left. The zones carry one, two and three bars, and the instruction refers to the bars.
 * The cubes never lie in their final order, left to right: then no weighing would be needed.
 * Chance: training has four orders, so one fixed answer is right in a quarter of it.
-* A cube is in a zone if its middle is over it, it stands on the table and has been released. The jaw sets it down there:
-  cubes that had only hung over a zone were pushed into theirs (3 of 6).
+* A cube is in a zone if its middle is over it, it stands on the table and has been released. The jaw sets it down
+  there: cubes that had only hung over a zone were pushed into theirs (3 of 6).
 """
 
 import math
