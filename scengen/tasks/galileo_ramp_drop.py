@@ -20,8 +20,8 @@ patch. There it touches the ramp first: a ball that ran from just above the slop
 run loses, and was caught as it came back (6 and 4 of 12). (3) The paper calls the ramp frictionless and ships it with
 0.10 to 0.50 (App. C). Training is close to the former: the ball let go at the height of the patch solves 32 of 48
 draws. App. C is an axis, where the ball rolls: that changes its speed (sqrt(10/7 g h) instead of sqrt(2 g h)) and not
-the height. The loss is in between, where the ball slips as it rolls (`Ramp.climb`). (4) The tray is fixed to the table: a
-tray that moves is a tool.
+the height. The loss is in between, where the ball slips as it rolls (`Ramp.climb`). (4) The tray is fixed to the table:
+a tray that moves is a tool.
 """
 
 import math
