@@ -25,6 +25,9 @@ Decisions, where the paper (App. B, T13) is silent:
   that went ahead on its straight line 11 of 12, none by the means. A policy may still correct its place for the speed
   that the wall took. "The catchable zone" of the paper starts 6 cm from the walls: a hand that followed a slow ball up
   to a wall (axis `dead_walls`) was in its place when the ball left it.
+* Near the wall the loss matters little. A hand that expects the mirror image, waits where that leaves the last wall,
+  and then moves by up to 18 mm to the ball's straight line catches 11 of 12 (`rolling_floor` 12, `dead_walls` 3),
+  without that move 9 of 12. It never uses the speed that a wall returns, and is fair.
 * Aims, places and both sides are drawn so widely that no place serves many: after a bounce, 16 % of the balls come
   within 20 mm of the best one, between open fingers that are turned the right way there. A hand that hovers over the
   best of many places, and moves 25 mm after the bounce, catches 10 of 60.

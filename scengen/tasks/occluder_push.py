@@ -19,6 +19,7 @@ Decisions where the paper (App. B, T26) is silent:
 
 * Hidden means: no camera of the table sees any part of a cube. That is exact, not sampled: a flat lid hides a cube if
   its foot, projected from the camera onto the lid's underside, lies within the lid.
+* The jaw sets the red cube down on the patch: one that had only hung over it was pushed onto it (6 of 6).
 * No other cube stands on the patch, held or not. Otherwise a policy could bring cube after cube until one counts.
 * Chance: training has three places for the red cube; a policy that always uncovers the same one is right in a third.
 * The paper's axis stacks two or three lids more on the target. Here every cube gets as many, because a single pile
@@ -41,7 +42,7 @@ from ..decisions import Decision, choice, near
 from ..geometry import UP, Outline, Vec3, about_z, corners, gap, least_gap
 from ..means import Mean, throughout, when
 from ..params import Bounded, param
-from ..predicates import borne, fallen, over, rests_on, still
+from ..predicates import fallen, over, rests_on, still
 from ..robots.jaw import FINGER_ACROSS, OPEN_GAP, SPAN, TIP_BELOW
 from ..scenario import Answer, Plan, Planner, Refutation, Scenario, Shortcut, on_table, require, within_reach
 from ..sim.world import World
@@ -80,7 +81,7 @@ class Spot(Bounded):
 class OccluderPush(Scenario):
     """Three covered cubes and a green patch."""
 
-    VERSION = 2
+    VERSION = 3
     CONCEALED = ("cube_*",)
     HOLD = 0.3
 
@@ -139,8 +140,9 @@ class OccluderPush(Scenario):
             "the red cube lay uncovered when the jaw gripped it": when(
                 lambda world: world.arm.grips(red(world)), open_above
             ),
-            "the jaw carried the red cube to the patch": when(
-                lambda world: self.on_patch(world, red(world)), lambda world: borne(world, world.arm, red(world))
+            "the jaw set the red cube down on the patch": when(
+                lambda world: self.on_patch(world, red(world)) and world.touching(red(world), "table"),
+                lambda world: world.arm.grips(red(world)),
             ),
             "no other cube came onto the patch": throughout(lambda world: not strays(world)),
         }

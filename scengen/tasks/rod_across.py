@@ -17,6 +17,8 @@ rod's upward side):
   torque alone does not suffice. Chance: one fixed place along the rod balances 9 % of training.
 * The jaw opens once, on a level rod, and leaves it alone. A jaw that is loosened on the ridge, catches the rod at 1 to
   4 deg and halves the stretch finds the place in 4 to 6 trials (12 of 12). That is labelled.
+* The same trials over the table's edge, before the rod comes to the ridge, are another way to find the centre of mass,
+  and fair (2 of 6).
 """
 
 import math

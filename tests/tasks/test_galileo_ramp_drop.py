@@ -28,7 +28,7 @@ from scengen.tasks.galileo_ramp_drop import GalileoRampDrop
 
 TASK = load_task("galileo_ramp_drop")
 NOMINAL = GalileoRampDrop()
-HELD = "the jaw held the ball on the near slope"
+HELD = "the jaw brought the ball to the near slope"
 FREE = "the ball was let go there at rest"
 LEFT_ALONE = "no hand touched the ball after that"
 TURNED = "the ball kept to the ramp and turned before the patch's upper edge"

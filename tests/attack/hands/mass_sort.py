@@ -1,15 +1,16 @@
-"""T25: weights are felt by pushing, or cubes are put down for good one after the other, the last by deduction."""
+"""T25: weights are felt by pushing, or cubes are put down for good one after the other, the last by deduction; or cubes
+that hung over a zone once are pushed into theirs."""
 
 import numpy as np
-from hand import Hand
+from hand import Hand, shove
 
 from scengen.assets.prop import TABLE_TOP
 from scengen.geometry import UP
 from scengen.scenario import Plan, Scenario
 from scengen.sim.arm import ROBOT
 from scengen.sim.world import World
-from scengen.skills.jaw import weigh
-from scengen.skills.motion import CLOSED, COARSE, STEADY, closing_along, go_to, push
+from scengen.skills.jaw import carry, put, weigh
+from scengen.skills.motion import CLOSED, COARSE, STEADY, closing_along, go_to, push, retreat
 from scengen.tasks.mass_sort import CARRY_HEIGHT, CUBE_COUNT, MassSort
 
 WEIGHTS = (0.49, 0.98, 1.96)  # weights of the paper's cubes by rank [N]
@@ -59,4 +60,23 @@ def one_after_the_other(scenario: Scenario, world: World) -> Plan:
         yield from scenario.place_held(world, cube, rank)
 
 
-HANDS = {"push_each": Hand(push_each), "one_after_the_other": Hand(one_after_the_other)}
+def weigh_and_push(scenario: Scenario, world: World) -> Plan:
+    """Weigh each cube, hold it over the middle zone, put it back; then push all into their zones."""
+    assert isinstance(scenario, MassSort)
+    arm, weights, half = world.arm, [], scenario.edge / 2 * UP
+    for cube in scenario.cubes:
+        start, high = world.com(cube), (scenario.edge + 0.02) * UP
+        yield from scenario.take(world, cube, scenario.edge + 0.02)
+        weights.append(float((yield from weigh(arm))[2]))
+        yield from carry(arm, cube, scenario.zones[1] + half + high, pace=COARSE)
+        yield from put(arm, cube, start, on="table", hover=0.03)
+        yield from retreat(arm, scenario.edge + 0.03)
+    for cube, weight in zip(scenario.cubes, weights, strict=True):
+        yield from shove(arm, cube, scenario.zones[sorted(weights).index(weight)] + half, near=0.012)
+
+
+HANDS = {
+    "push_each": Hand(push_each),
+    "one_after_the_other": Hand(one_after_the_other),
+    "weigh_and_push": Hand(weigh_and_push),
+}
