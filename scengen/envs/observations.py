@@ -240,7 +240,8 @@ def requested(names: str | Iterable[str] | None, embodiment: str) -> tuple[str, 
     return tuple(dict.fromkeys(each for name in given for each in words.get(name, (name,))))
 
 
-MEANT: dict[str, str] = dict.fromkeys(("image", "images", "camera", "cameras", "pixels", "rgb", "vision", "visual"), PICTURES)
+_ELSEWHERE: tuple[str, ...] = ("image", "images", "camera", "cameras", "pixels", "rgb", "vision", "visual")
+MEANT = dict.fromkeys(_ELSEWHERE, PICTURES)
 """What words of other packages are called here."""
 
 
