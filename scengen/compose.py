@@ -401,7 +401,7 @@ def _check_override(verb: str, text: str) -> None:
             if why := unread(str(folder)):
                 raise BadConfig(f"{quoted}: {why}")
     in_group = key in ("task", "certify", "executor") and key in groups(verb)
-    if in_group and isinstance(value := override.value(), list):
+    if in_group and isinstance(value := override.value(), list) and value:
         raise BadConfig(f"{quoted} is a list; give {key}={','.join(map(str, value))} without brackets")
     if in_group and not re.fullmatch(r"\w+", str(override.value()), re.ASCII):
         raise BadConfig(f"{quoted}: expected the name of a file of conf/{key} without .yaml; {_files_of(key)}")

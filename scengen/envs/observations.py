@@ -240,8 +240,7 @@ def requested(names: str | Iterable[str] | None, embodiment: str) -> tuple[str, 
     return tuple(dict.fromkeys(each for name in given for each in words.get(name, (name,))))
 
 
-_ELSEWHERE: tuple[str, ...] = ("image", "images", "camera", "cameras", "pixels", "rgb", "vision", "visual")
-MEANT = dict.fromkeys(_ELSEWHERE, PICTURES)
+MEANT = dict.fromkeys(("image", "images", "camera", "cameras", "pixels", "rgb", "vision", "visual"), PICTURES)
 """What words of other packages are called here."""
 
 

@@ -219,10 +219,10 @@ class Run(LineLog):
         ordered = sorted(some, key=lambda which: (which.arm != CLEAN, bool(which.condition), which.condition))
         counts = ", ".join(f"{n} {name}" for name, n in Counter(map(_named, ordered)).items())
         scenarios, earlier = len({which.scenario for which in some}), len(some & {*map(id_of, self.log.records)})
-        told = f"{len(some)} episodes of {scenarios} scenarios x {self.settings.rollouts}: {counts}"
+        told = f"episodes: {counts} (n = {scenarios} x {self.settings.rollouts})"
         automatic = self.settings.chosen_arms is None and any(which.arm != CLEAN for which in some)
         remarks = {
-            f"{earlier} are from an earlier run": bool(earlier),
+            f"{earlier} from an earlier run": bool(earlier),
             "arms=none leaves out the arms": automatic,
             "pictures are slow without a graphics card, smaller width= and height= save time": self.player.has_cameras,
         }
