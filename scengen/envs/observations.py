@@ -240,7 +240,7 @@ def requested(names: str | Iterable[str] | None, embodiment: str) -> tuple[str, 
     return tuple(dict.fromkeys(each for name in given for each in words.get(name, (name,))))
 
 
-MEANT = dict.fromkeys(("image", "images", "camera", "cameras", "pixels", "rgb", "vision", "visual"), PICTURES)
+MEANT: dict[str, str] = dict.fromkeys("image images camera cameras pixels rgb vision visual".split(), PICTURES)
 """What words of other packages are called here."""
 
 
