@@ -19,7 +19,6 @@ from ..errors import NoOracle, ScengenError
 from ..pool import Pool, PoolRow
 from ..samplers.task import Task
 from ..scenario import Scenario
-from ..sim.models import model_difference
 from ..sim.world import World
 from ..validate.certify import Trial
 from ..validate.rollout import replay
@@ -30,6 +29,7 @@ from ..validate.verify.stored import settings_of_manifest, task_of_manifest
 from ..work.fingerprint import fingerprint
 from ..work.parallel import Limits, each
 from .environment import answer
+from .models import model_difference
 
 ORACLES = ("shortcuts", "solved", "robust")
 """Checks of the shortcuts and the oracle, which do not use the witness."""

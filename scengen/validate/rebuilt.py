@@ -8,11 +8,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..compat import from_mjcf
 from ..errors import BadConfig, contrasted, cut
 from ..scenario import Scenario
 from ..sim import scene_text
 from ..sim.embodiment import JAW
-from ..sim.models import model_difference
 from ..sim.world import World
 from .impaired import posed
 
@@ -29,8 +29,6 @@ WHOLE = frozenset(
 _ELEMENTS = re.compile(r"(opt|body|jnt|dof|geom|site|cam|light|eq|exclude|pair|tendon|wrap|actuator|sensor|mat)_")
 """Beginning of the fields of a model whose whole numbers say what its elements are. Meshes and search trees have whole
 numbers that depend on rounding."""
-_UNCOMPARED = ("bvh", "ctrlspec")
-"""Parts of the names of fields of search trees, and of the kind of an actuator's input, which only MuJoCo 4 writes."""
 SECTIONS = (
     "compiler",
     "option",
@@ -126,17 +124,20 @@ def difference(text: str, rebuilt: str, exact: bool, embodiment: str = JAW) -> s
     return _other_model(text, rebuilt, embodiment)
 
 
-def other_physics(text: str, rebuilt: str, embodiment: str = JAW) -> str:
-    """How the physics of a pool's scene differs from that of the rebuilt one, as text; empty if it does not.
+def other_scene(text: str, rebuilt: str, embodiment: str = JAW) -> str:
+    """Difference between the scene of a pool of another MuJoCo and the rebuilt one; empty if there is none.
 
-    Both are compiled by the MuJoCo of this process, which writes the same scene otherwise than the one of the pool.
+    Versions write the same scene with other defaults, so both are written again by the MuJoCo of this process.
     """
     if text == rebuilt:
         return ""
-    if why := _unreadable(text, rebuilt) or _other_model(text, rebuilt, embodiment):
+    if why := _unreadable(text, rebuilt):
         return why
-    why = model_difference(World.load(text, embodiment).model, World.load(rebuilt, embodiment).model)
-    return f"{NOT_REBUILT}: {why}" if why else ""
+    try:
+        again, made = (scene_text.emit(from_mjcf(each))[0] for each in (text, rebuilt))
+    except ValueError as error:
+        return _not_read(error)
+    return difference(again, made, False, embodiment) or _other_model(text, rebuilt, embodiment)
 
 
 def _unreadable(text: str, rebuilt: str) -> str:
@@ -152,19 +153,21 @@ def _unreadable(text: str, rebuilt: str) -> str:
     return ""
 
 
+def _not_read(error: ValueError) -> str:
+    return f"{NOT_REBUILT}: MuJoCo does not read it: {cut(' '.join(str(error).split()))}"
+
+
 def _other_model(text: str, rebuilt: str, embodiment: str) -> str:
     """How the model of a scene whose text says nearly the same differs from the rebuilt one; empty if it does not."""
     try:
         here = World.load(text, embodiment).model
     except ValueError as error:
-        return f"{NOT_REBUILT}: MuJoCo does not read it: {cut(' '.join(str(error).split()))}"
+        return _not_read(error)
     there = World.load(rebuilt, embodiment).model
     if here.names != there.names:
         return f"{NOT_REBUILT}: its elements have other names"
     for name in dir(there):
-        values = (
-            getattr(there, name) if _ELEMENTS.match(name) and not any(part in name for part in _UNCOMPARED) else None
-        )
+        values = getattr(there, name) if _ELEMENTS.match(name) and "bvh" not in name else None
         if isinstance(values, np.ndarray) and values.dtype.kind in "iub":
             if not np.array_equal(values, getattr(here, name)):
                 return f"{NOT_REBUILT}: compiled, {name} differs"

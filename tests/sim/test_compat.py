@@ -8,7 +8,7 @@ from scengen import load_task
 from scengen.assets.box import Domino
 from scengen.assets.prop import TABLE_TOP, place, table
 from scengen.compat import from_mjcf, set_damping, set_multiccd, to_mjcf
-from scengen.sim.models import model_difference
+from scengen.drift.models import model_difference
 from scengen.sim.scene_text import emit
 from scengen.sim.world import World
 

@@ -413,17 +413,23 @@ def test_older_software_is_declined(mine):
 
 def test_a_pool_of_another_mujoco_is_judged_by_what_holds_here_on_request(mine):
     of = Pool.open(mine)
-    older = {**of.manifest.versions, "mujoco": "3.3.0"}
+    older, stored = {**of.manifest.versions, "mujoco": "3.3.0"}, [*of.rows()]
     (mine / "scengen.lock").unlink()
 
     def judged(forge):
-        rows = [certificate_of(forge(row), versions=older) for row in of.rows()]
+        rows = [certificate_of(forge(row), versions=older) for row in stored]
         write_pool(mine, replace(of.manifest, versions=older), rows)
         return report(mine, any_mujoco=True, sample=None)
 
     found = judged(certificate_with(final_state="0" * 32))
     assert (found.verdict, found.sound, found.drifted) == ("sound", len(of), len(of))
     assert any("certified with mujoco 3.3.0, this is" in remark for remark in found.remarks)
+    for attribute in ("o_margin", "ls_iterations", "noslip_iterations"):
+        found = judged(scene("<option ", f'<option {attribute}="3" '))
+        assert (found.verdict, found.declined) == ("declined", len(of)), "a scene with other physics is never sound"
+        assert f"{attribute} of <option>" in found.failed[0]["reason"]
+    found = judged(scene("<geom name=", '<geom solmix="100" name='))
+    assert (found.verdict, found.declined) == ("declined", len(of)) and "solmix of" in found.failed[0]["reason"]
     found = judged(witness(lambda actions: actions * 0))
     assert (found.verdict, found.declined) == ("declined", len(of))
     assert "certified with mujoco 3.3.0" in found.failed[0]["reason"] and "witness fails" in found.failed[0]["reason"]

@@ -10,7 +10,7 @@ from ...pool import PoolRow
 from ...pool.manifest import MANIFEST
 from ...work.fingerprint import same_bits
 from ..certify import Adversary
-from ..rebuilt import difference, other_physics, rebuild
+from ..rebuilt import difference, other_scene, rebuild
 from . import survey
 from .claims import (
     Claims,
@@ -124,7 +124,7 @@ class Examiner:
         reasons += (wrong_certificate if certified else wrong_rejection)(row, scenario, claims)
         text = rebuild(scenario) if compiles(row) else scene_or_nothing(scenario)
         if of_another_mujoco(claims.manifest):
-            other = other_physics(row.scene_xml, text, row.embodiment)
+            other = other_scene(row.scene_xml, text, row.embodiment)
         else:
             other = difference(row.scene_xml, text, same_bits(row.certificate), row.embodiment)
         if other:
