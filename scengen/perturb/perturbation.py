@@ -124,7 +124,7 @@ class Perturbation:
             look: look of the pictures.
             setting: the setting that adds a stream or a camera, with `{}` for its name.
         """
-        lacking, added = list[str](), dict[str, str]()
+        lacking, added = list[str](), list[str]()
         for name, level in self.parts:
             effect = kinds()[name].effect
             if effect.reads in (LANGUAGE, CONTROL):
@@ -134,15 +134,18 @@ class Perturbation:
                     f"perturb = {name}@{level} shows in look={' and '.join(effect.looks)}, not in {look.name}"
                 )
             if effect.reads == PICTURES:
-                seen = [camera for camera in cameras if affects(effect, camera)]
+                which = what = effect.cameras
+                is_seen = any(affects(effect, camera) for camera in cameras)
             else:
-                seen = [stream for stream in streams if stream_kind(stream) == effect.reads]
-            if not seen:
-                what = effect.cameras if effect.reads == PICTURES else f"streams of {effect.reads}"
+                which, what = effect.reads, f"streams of {effect.reads}"
+                is_seen = any(stream_kind(stream) == which for stream in streams)
+            if not is_seen:
                 lacking.append(f"{name}@{level} affects {what}, and none is observed")
-                added[EXAMPLES[effect.cameras if effect.reads == PICTURES else effect.reads]] = ""
+                added.append(EXAMPLES[which])
         if lacking:
-            raise BadConfig(f"perturb = {'; '.join(lacking)}: add one, such as {setting.format(','.join(added))}")
+            raise BadConfig(
+                f"perturb = {'; '.join(lacking)}: add one, such as {setting.format(','.join(dict.fromkeys(added)))}"
+            )
 
     def senses(
         self, model: mujoco.MjModel, scenario: str, task: str, instruction: str, seed: int, search: Sequence[str] = ()

@@ -92,8 +92,8 @@ def _benign_pools(settings: EvaluateSettings, search: Sequence[str]) -> list[str
 def _evaluated(settings: EvaluateSettings, progress: Progress, search: Sequence[str]) -> Evaluation:
     """Evaluate one policy, and keep its rollouts if that is requested."""
 
-    def announce(told: str) -> None:
-        warn(f"evaluate {settings.name}: {told}", "none")  # standard output would break the bar
+    def announce(line: str) -> None:
+        warn(f"evaluate {settings.name}: {line}", "none")  # standard output would break the bar
 
     if not settings.keep:
         return evaluate(settings, progress, search, announce=announce)
@@ -108,7 +108,7 @@ def _evaluated(settings: EvaluateSettings, progress: Progress, search: Sequence[
 
 def _show(compared: Comparison, settings: EvaluateSettings) -> None:
     """Print the tables and the headlines."""
-    told = list[str]()
+    explained = list[str]()
     for shown in compared.tables():
         common = [shown.common[name] for name in ("task", "policy") if name in shown.common]
         n = f", n = {shown.common['n']}" if "n" in shown.common else ""
@@ -117,12 +117,12 @@ def _show(compared: Comparison, settings: EvaluateSettings) -> None:
         table = _table(title, *_grouped(shown))
         for column in table.columns[1:]:
             column.no_wrap, column.justify = True, "right"
-        if told:
+        if explained:
             say("")
         out.print(table)
-        for line in (line for line in shown.legend if line not in told):
+        for line in (line for line in shown.legend if line not in explained):
             say(line)
-        told += shown.legend
+        explained += shown.legend
     for title, (head, rows) in (
         ("goal reached otherwise than by the means of the task", compared.way_table()),
         ("failures", compared.failure_table()),
