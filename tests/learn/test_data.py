@@ -106,6 +106,11 @@ def test_of_several_tasks_one_is_chosen(mine):
         TrainingData.read(mine, task="packin")
 
 
+def test_what_cannot_be_learned_is_one_line_without_remarks(mine, tmp_path, capsys):
+    assert cli.run(["train", "task=packin", f"data={mine}", f"to={tmp_path / 'policy'}"]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
 @pytest.mark.parametrize("told", [[2, 1, 2], [2, None, 2], [0, 0, 0], ["2", "2", "2"]])
 def test_a_recording_has_one_version_of_its_task(mine, told):
     assert TrainingData.read(mine).task_version == 2

@@ -30,9 +30,9 @@ def command(arguments: Arguments) -> int:
     settings.check()
     recording = _recording(settings, arguments)
     _check_decisions(Recording.open(recording))
+    data = TrainingData.read(recording, settings.observations, settings.demonstrations, settings.task)
     if kept_episodes(Recording.open(recording)) is None and not is_demonstrations(settings.data):
         remark(f"{recording} was not curated: what it says is claimed; scengen curate data={recording} checks it")
-    data = TrainingData.read(recording, settings.observations, settings.demonstrations, settings.task)
     left_out = ", ".join(f"{count} {why}" for why, count in data.left_out.items() if count)
     if left_out:
         remark(f"episodes that are not learned from: {left_out}")
