@@ -74,14 +74,6 @@ def test_a_recording_of_other_demonstrations_is_not_learned_from(tmp_path, capsy
     assert status == 2 and "was recorded from other demonstrations" in text
 
 
-def test_a_recording_that_was_not_curated_is_called_claimed(tmp_path, capsys):
-    folder = honest("recording", tmp_path / "data")
-    words = ("train", f"data={folder}", "policy=knn", f"to={tmp_path / 'policy'}")
-    assert "was not curated: what it says is claimed; scengen curate" in said(capsys, *words)[1]
-    assert said(capsys, "curate", f"data={folder}", "replay=false")[0] == 0
-    assert "was not curated" not in said(capsys, *words)[1]
-
-
 @pytest.mark.parametrize("verb", ["demos", "evaluate", "train", "subset", "generate"])
 def test_no_command_writes_into_a_thing_of_another_kind(verb, tmp_path, capsys):
     folder = honest("recording", tmp_path / "data")

@@ -106,6 +106,15 @@ def test_of_several_tasks_one_is_chosen(mine):
         TrainingData.read(mine, task="packin")
 
 
+def test_a_recording_that_was_not_curated_is_called_claimed(mine, tmp_path, capsys):
+    words = ["train", "policy=knn", f"data={mine}", f"to={tmp_path / 'policy'}"]
+    assert cli.run(words) == 0
+    assert "was not curated: what it says is claimed; scengen curate" in capsys.readouterr().err
+    assert cli.run(["curate", f"data={mine}", "replay=false"]) == 0
+    cli.run(words)
+    assert "was not curated" not in capsys.readouterr().err
+
+
 def test_what_cannot_be_learned_is_one_line_without_remarks(mine, tmp_path, capsys):
     assert cli.run(["train", "task=packin", f"data={mine}", f"to={tmp_path / 'policy'}"]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
