@@ -218,6 +218,8 @@ def test_show_takes_an_index_in_place_of_an_id(capsys, made):
     for words, says in (
         (("show", f"id={row.id}", "index=0"), "give one of them"),
         (("show", "index=999"), "no scenario has it"),
+        (("show", f"index={'9' * 400}"), "; it must be at most 1000000000"),
+        (("show", "index=-1"), "index = -1; it must be at least 0"),
         (("show", "view"), "give id=ID or index=N"),
     ):
         assert cli.run((*words, f"pool={made}")) == 2

@@ -15,6 +15,7 @@ from ...pool.demonstrations import Demonstrations, is_demonstrations
 from ...pool.library import Library
 from ...pool.library import names as names  # for the commands
 from ...pool.names import Misnamed
+from ...work.limits import MAX_SETTINGS
 from ...work.printed import PlainConsole, printable, width
 from ...work.targets import write as write  # for the commands
 
@@ -106,14 +107,16 @@ def identified(pool: str | list[str], name: str | None, index: int | None) -> st
         pool: folders of pools, demonstrations or kept rollouts.
 
     Raises:
-        BadConfig: neither or both were given, or not exactly one scenario has the index.
+        BadConfig: neither or both were given, the index is none, or not exactly one scenario has it.
     """
     if name is not None and index is not None:
-        raise BadConfig(f"id = {cut(name)} and index = {index}; give one of them")
+        raise BadConfig(f"id = {cut(name)} and index = {cut(str(index))}; give one of them")
     if index is None:
         if name is None:
             raise BadConfig("no scenario was given; give id=ID or index=N")
         return name
+    if not 0 <= index <= (most := MAX_SETTINGS["index"]):
+        raise BadConfig(f"index = {cut(str(index))}; it must be {f'at most {most}' if index > 0 else 'at least 0'}")
     found = dict[str, str]()
     for folder in several(pool):
         if is_demonstrations(folder):
