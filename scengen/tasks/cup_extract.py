@@ -13,7 +13,7 @@ beyond level by the angle of friction on its wall, and only the handle allows th
 * The wall is so thin that the jaw's springs exert almost no force when the fingers close on it (`pinch`): friction
   there does not lift an upright cup. The handle is thick. The wall still lets a jaw lean the cup on the table, and then
   lift it on its side, because it lies on a finger. Held as deep as the palm allows, 5 of 6 were turned to more than 110
-  deg in the air, but the palm is over the mouth, and the block stayed in all; held 12 mm less deep, 2 of 6 were, and it
+  deg in the air, but the palm is over the mouth, and the block stayed in all; held less deep, 2 of 6 were, and it
   stayed as well. A block that leaves a cup on the table is labelled.
 * Fingers that open inside the cup slide out of it: they taper more than the friction of the wall holds.
 * A pushed cup slides: its friction on the table is less than the distance of its centre of mass from the edge over its
