@@ -11,8 +11,10 @@ Bottleneck: the block is out of reach of the hand from every direction. It leave
 beyond level by the angle of friction on its wall, and only the handle allows that turn:
 
 * The wall is so thin that the jaw's springs exert almost no force when the fingers close on it (`pinch`): friction
-  there bears less than the weight of cup and block. The handle is thick. The wall still lets a jaw lean the cup on the
-  table; a block that leaves a cup that is not held in the air is labelled.
+  there does not lift an upright cup. The handle is thick. The wall still lets a jaw lean the cup on the table, and then
+  lift it on its side, because it lies on a finger. Held as deep as the palm allows, 5 of 6 were turned to more than 110
+  deg in the air, but the palm is over the mouth, and the block stayed in all; held less deep, 2 of 6 were, and it
+  stayed as well. A block that leaves a cup on the table is labelled.
 * Fingers that open inside the cup slide out of it: they taper more than the friction of the wall holds.
 * A pushed cup slides: its friction on the table is less than the distance of its centre of mass from the edge over its
   height, also towards the handle.
@@ -24,6 +26,8 @@ Decisions, where the paper (App. B, T24) is silent:
 * In the region means: out of the cup, upright or upside down, touching the table alone, at rest, for 0.3 s, 30 steps as
   in the paper's T12 and T13. The cup may then be anywhere on the table. Pouring the block straight into the region
   counts, and so does shaking it out of a cup held level by its handle: the insight is the same.
+* The direction of the handle needs no look in training: a jaw that closes where the handle is at 180 deg solves 12 of
+  12, and on `turned_handle` 0 of 3.
 * The friction of the wall is not visible; a cup that is turned slowly shows it. There is no `answer` to guess, because
   turning the cup farther than needed is not a failure.
 """

@@ -20,6 +20,9 @@ Decisions where the paper (App. B, T21) is silent:
   arrives in 12 of 12. That is fair.
 * The gap is seen, not felt for. A badly aimed ball could roll along the wall until it finds the gap, or be tried again;
   closed fingers that slid along the wall to a jamb found it in 12 of 12.
+* The square alone shows the axis where the gap leads straight ahead: a policy that never looks at wall and gap, and
+  believes that they are where they are in training, solves 12 of 12 (`far_gap` and `narrow_gap` 6 of 6, `turned_wall` 0
+  of 6). That is fair.
 * The ball may be held, but not lifted: over the wall no gap is needed. The wall is so high that the palm cannot pass
   over it while the jaw holds the ball on the table.
 * No hand touches the ball beyond the middle of the wall. The hand's narrow side, 63 mm, fits through the gap: a ball
