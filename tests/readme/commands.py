@@ -36,6 +36,7 @@ APART = {
     "scengen record pool=generated/id to=recordings/id ": "four cameras: a quarter of an hour without a graphics card",
     "scengen record pool=generated/domino_single-id-demos": "the demonstrations are not made",
     "scengen verify robosuite": "10 episodes under robosuite's own controller: 2 minutes",
+    "pip install": "it would change the environment",
     "pytest --scengen-task": "wants the package of scengen new to be installed",
     "scengen demos task=domino_single n=200": "200 demonstrations: a minute",
     "scengen demos task=domino_single,packing": "40 demonstrations: a minute",
