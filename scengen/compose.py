@@ -10,12 +10,12 @@ import math
 import os
 import re
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 from hydra import compose, initialize_config_dir
@@ -27,7 +27,8 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from .errors import SHOWN_LENGTH, BadConfig, UnknownName, cut
+from .errors import SHOWN_LENGTH, BadConfig, ScengenError, UnknownName, cut
+from .samplers.split import ID
 from .samplers.task import Task, load
 from .samplers.task_files import (
     ORIGINS,
@@ -45,6 +46,8 @@ from .samplers.task_files import (
 )
 from .validate.settings import CertifySettings
 from .work.typed import typed
+
+T = TypeVar("T")
 
 # --- tasks ------------------------------------------------------------------------------------
 
@@ -140,6 +143,11 @@ def composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[
             node = compose(config_name(verb, prepared), overrides=prepared, return_hydra_config=True)
             choices = {k: v for k, v in node.hydra.runtime.choices.items() if isinstance(v, str)}
             OmegaConf.set_struct(node, False)
+            if EXPERIMENT in choices:
+                files = [text for text in prepared if text.startswith(SEARCH_PATH)]
+                files += [f"{group}={choices[group]}" for group in groups(verb) if group in choices]
+                plain = compose(config_name(verb, prepared), overrides=files, return_hydra_config=True)
+                _check_hydra(choices[EXPERIMENT], node, plain)
             del node["hydra"]
             if EXPERIMENT in node and EXPERIMENT in choices:
                 raise BadConfig(f"{EXPERIMENT}/{choices[EXPERIMENT]}.yaml: start it with `# @package _global_`")
@@ -268,6 +276,8 @@ def _logging_restored() -> Iterator[None]:
 
 # --- overrides --------------------------------------------------------------------------------
 
+SWEEPING = ("generate", "demos")
+"""Commands that take several values of a setting."""
 JOINED = ("split", "perturb")
 """Settings whose parts are joined by `+`."""
 LISTED = 5
@@ -356,6 +366,18 @@ def _with_packages(overrides: Sequence[str]) -> list[str]:
     return [f"hydra.searchpath=[{','.join([*map(str, folders), *packages()])}]", *others]
 
 
+def _check_hydra(experiment: str, node: DictConfig, plain: DictConfig) -> None:
+    """Refuse an experiment with settings of Hydra, which would have no effect.
+
+    Raises:
+        BadConfig: one line with the remedy.
+    """
+    for key in ("mode", "run", "sweep", "launcher", "sweeper", "verbose", "env", "callbacks"):
+        if OmegaConf.to_container(node.hydra)[key] != OmegaConf.to_container(plain.hydra)[key]:  # type: ignore[index]
+            told = f"{EXPERIMENT}/{experiment}.yaml: leave hydra.{key} out"
+            raise BadConfig(f"{told}; {_instead_of(f'hydra.{key}')}scengen accepts no setting of Hydra in a file")
+
+
 def _check_override(verb: str, text: str) -> None:
     """Refuse overrides that scengen does not support, or that Hydra cannot process.
 
@@ -381,7 +403,10 @@ def _check_override(verb: str, text: str) -> None:
         and isinstance(value := override.value(), list)
         and key not in _lists(verb)
     ):
-        raise BadConfig(f"{quoted}: parts are joined by +; give {key}={'+'.join(map(str, value))}")
+        parts = [*map(str, value)]
+        ways = [] if ID in parts else [f"parts are joined by +; give {key}={'+'.join(parts)}"]
+        ways += [f"{key}={','.join(parts)} without brackets makes a run of each"] if verb in SWEEPING else []
+        raise BadConfig(f"{quoted}: {'; '.join(ways) or 'give one of them'}")
     if key.split(".")[0].split("/")[0] == "hydra" and key != "hydra.searchpath":
         instead = _instead_of(key)
         raise BadConfig(f"{quoted}: leave it out; {instead}scengen accepts no setting of Hydra but hydra.searchpath")
@@ -395,8 +420,9 @@ def _check_override(verb: str, text: str) -> None:
             if not re.match(r"(file|pkg)://.", str(folder)):
                 raise BadConfig(f"{quoted}: give a folder of configuration as file:///folder or pkg://package")
             if not is_folder(str(folder)):  # Hydra only warns, and goes on without it
+                named = cut(str(folder).removeprefix("file://"))
                 raise BadConfig(
-                    f"{quoted}: there is no folder {cut(str(folder))}; give one that holds task/<task>.yaml"
+                    f"hydra.searchpath: there is no folder {named}; give one that holds task/, certify/ or experiment/"
                 )
             if why := unread(str(folder)):
                 raise BadConfig(f"{quoted}: {why}")
@@ -421,7 +447,7 @@ def _one_by_one(verb: str, override: Override) -> str:
     shown = [*map(shlex.quote, values[:LISTED]), *(["..."] if len(values) > LISTED else [])]
     target = next((f" {name}=NAME-$x" for name in ("to", "json") if name in _known(verb)), "")
     loop = f"for x in {' '.join(shown)}; do scengen {verb} ... {key}=$x{target}; done"
-    return f"{verb} takes one at a time (generate and demos take several); repeat it: {loop}"
+    return f"{verb} takes one at a time ({' and '.join(SWEEPING)} take several); repeat it: {loop}"
 
 
 def _lists(verb: str) -> list[str]:
@@ -454,7 +480,9 @@ def _remedy(verb: str, text: str) -> str:
         return f"; these are {len(parts)} settings: give {' '.join(map(shlex.quote, parts))}"
     key, given, value = text.partition("=")
     if value[:1] in OPENING:
-        split = any(value.count(opening) > value.count(closing) for opening, closing in OPENING.items())
+        split = [closing for opening, closing in OPENING.items() if value.count(opening) > value.count(closing)]
+        if split and value[-1] in (*OPENING.values(), "'"):
+            return f"; a bracket is not closed: {split[0]} is missing"
         if split:
             return f"; a shell splits it at spaces: put all of it in single quotes, '{key}=...'"
         return '; put double quotes around texts within it, as in {why: "a; b"}'
@@ -512,6 +540,30 @@ class Combination:
         return " ".join(f"{key}={value}" for key, value in self.swept.items())
 
 
+def each_checked(requested: Sequence[Combination], look: Callable[[Combination], T], told: str) -> list[T]:
+    """Apply a function to all combinations.
+
+    Args:
+        told: what was not made.
+
+    Raises:
+        ScengenError: no combination is valid, for the same reason.
+        BadConfig: a combination is not valid; the message names it.
+    """
+    results, errors = list[T](), dict[str, ScengenError]()
+    for one in requested:
+        try:
+            results.append(look(one))
+        except ScengenError as error:
+            errors[str(one)] = error
+    if not errors:
+        return results
+    first, error = next(iter(errors.items()))
+    if len(errors) == len(requested) and len({*map(str, errors.values())}) == 1:
+        raise error
+    raise BadConfig(f"{first}: {error}; {told}; leave this combination out")
+
+
 def combinations(verb: str, overrides: Sequence[str]) -> list[Combination]:
     """All combinations of a command line with multiple values: `n=1,2`, or Hydra's choice, range and glob.
 
@@ -566,6 +618,10 @@ def _explained(verb: str, overrides: Sequence[str], error: Exception) -> BadConf
     if match := re.search(r"Could not find '(\w+)/([^']*)'", text):
         group, name = match.groups()
         return UnknownName(group, name, re.findall(r"^\s+(\S+)$", text, re.M))
+    if (match := re.match(r"force-add of config groups is not supported: '\+\+(.*)'", text)) or (
+        match := next(filter(None, (re.match(f"({EXPERIMENT}=.*)", each) for each in overrides)), None)
+    ):
+        return BadConfig(f"{EXPERIMENT} is a group of your own files; give +{cut(match[1])}, with one plus")
     if match := re.search(r"You must specify '(\w+)'", text):
         known = ", ".join(re.findall(r"^\s+(\S+)$", text, re.M))
         return BadConfig(f"{verb} needs {match[1]}=NAME; known: {known}")
@@ -602,8 +658,6 @@ def _unknown_key(verb: str, overrides: Sequence[str], path: str) -> UnknownName 
             return BadConfig(f"{path}: {whole} has no settings in it; give {whole}=... alone")
         if not seen and part in groups(verb) and part not in node.keys():  # noqa: SIM118
             return BadConfig(f"{path}: no {part} is chosen; give {part}=NAME, too")
-        if not seen and part == EXPERIMENT:
-            return BadConfig(f"{part} is a group of your own files; give +{part}=NAME, with a plus")
         if part not in node.keys():  # noqa: SIM118  (`in` leaves out what has no value yet)
             known = {*map(str, node), *([] if seen else groups(verb))}
             if seen == ["executor"] and not known:

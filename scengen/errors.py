@@ -44,7 +44,10 @@ class UnknownName(ScengenError):
         super().__init__(f"no {kind} named {cut(repr(name))}{close}{also}; known: {listed}{remedy}")
 
 
-REMEDIES = {"task": "hydra.searchpath=FOLDER adds the folder that holds your task/NAME.yaml"}
+REMEDIES = {
+    "task": "hydra.searchpath=FOLDER adds the folder that holds your task/NAME.yaml",
+    "certify": "hydra.searchpath=FOLDER adds the folder that holds your certify/NAME.yaml",
+}
 """Remedies for unknown names, by kind."""
 
 

@@ -281,6 +281,8 @@ def _show(verb: str, arguments: Sequence[str]) -> int:
     if not what and place < len(words) and "=" not in words[place]:
         what = words.pop(place)
     words = [word for word in words if word != "--resolve"]  # what is printed is resolved
+    if any(word.partition("=")[0] in ("-p", "--package") for word in words):
+        raise BadConfig(f"{option} shows the whole configuration; leave -p out")
     if others := [word for word in words if word.startswith("-")]:
         raise BadConfig(f"{cut(repr(others[0]))} cannot be combined with {option}; give one of them")
     if SHOW_OPTIONS[option] == "--info":

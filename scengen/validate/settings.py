@@ -76,6 +76,10 @@ class CertifySettings:
                 f"in {runs} runs show {lower_bound(runs, runs):.3g}; give {more}certify.robust.bound={shown:g}"
             )
 
+    def falls_short(self, level: "CertifySettings") -> bool:
+        """Whether these settings have the name of a level and show less than it. Those of quick may show anything."""
+        return self.name != QUICK.name and self.robust.bound < level.robust.bound
+
 
 BOUNDS: dict[str, tuple[float, float, str]] = {
     "overlap": (0.0, 0.01, " m"),

@@ -52,6 +52,8 @@ def experiments(tmp_path):
     (tmp_path / "experiment").mkdir()
     (tmp_path / "experiment" / "heavy.yaml").write_text(HEAVY)
     (tmp_path / "experiment" / "bare.yaml").write_text("n: 3\n")
+    sweeping = "# @package _global_\nn: 3\nhydra: {sweeper: {params: {split: 'id,diagonal'}}}\n"
+    (tmp_path / "experiment" / "sweeping.yaml").write_text(sweeping)
     (tmp_path / "experiment" / "few.yaml").write_text("# @package _global_\nn: 3\n")
     return f"hydra.searchpath={tmp_path}"
 
@@ -82,7 +84,9 @@ def test_experiments_are_swept_shown_and_taken_by_commands_without_groups(experi
     [
         ("+experiment=hevy", "did you mean 'heavy'?"),
         ("+experiment=bare", "experiment/bare.yaml: start it with `# @package _global_`"),
-        ("experiment=heavy", "give +experiment=NAME, with a plus"),
+        ("experiment=heavy", "give +experiment=heavy, with one plus"),
+        ("++experiment=heavy", "give +experiment=heavy, with one plus"),
+        ("+experiment=sweeping", "experiment/sweeping.yaml: leave hydra.sweeper out; several values make a sweep"),
     ],
 )
 def test_an_experiment_that_cannot_be_taken_has_a_remedy(word, told, experiments, capsys):

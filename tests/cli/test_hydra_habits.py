@@ -84,6 +84,19 @@ def test_an_axis_of_another_task_of_a_sweep_is_left_out_and_told(capsys):
     )
 
 
+def test_pools_that_are_told_apart_in_their_own_names_have_these_names(tmp_path):
+    for named, told in {"${split}/${task}": "{0}/domino_single", "all": "all/domino_single-{0}"}.items():
+        asked = compose.combinations("generate", [DOMINO, "split=id,wide_gaps", f"pool={tmp_path / named}"])
+        runs = generate._with_folders(*generate._valid_runs(asked))
+        assert [run.settings.pool for run in runs] == [str(tmp_path / told.format(s)) for s in ("id", "wide_gaps")]
+
+
+def test_a_sweep_is_not_written_into_a_pool(capsys, tmp_path):
+    pool = shutil.copytree(REFERENCE, tmp_path / "pool")
+    status, shown = said(capsys, "generate", DOMINO, "split=id,wide_gaps", f"pool={pool}")
+    assert status == 2 and f"{pool} is a pool already (manifest.json); choose another pool=" in shown.err
+
+
 @pytest.mark.slow
 def test_a_sweep_makes_a_pool_for_each_combination_and_is_continued(capsys, tmp_path, monkeypatch):
     asked = ("generate", "-m", DOMINO, "split=id,wide_gaps", "n=1", *QUICKLY, f"pool={tmp_path}")
@@ -117,6 +130,12 @@ def test_other_commands_say_that_they_take_one_value(capsys):
         (("train", "data=x", "to=y", "policy=bc,mip"), "give one of them, and repeat the command for the others"),
         (("generate", DOMINO, "perturb=[a@1,b@1]"), "parts are joined by +; give perturb=a@1+b@1"),
         (("generate", DOMINO, "split=[diagonal,wide_gaps]"), "parts are joined by +; give split=diagonal+wide_gaps"),
+        (("generate", DOMINO, "split=[id,diagonal]"), ": split=id,diagonal without brackets makes a run of each"),
+        (("generate", DOMINO, "split=id,diagonal", "hydra.mode=MULTIRUN"), "scengen: 'hydra.mode=MULTIRUN': leave it"),
+        (("generate", DOMINO, "certify=mine"), "hydra.searchpath=FOLDER adds the folder that holds your certify/NAME"),
+        (("generate", DOMINO, "certify=full", "certify.robust.bound=0.4"), "level full have 0.8 or more"),
+        (("generate", DOMINO, "+task.axes.x={why: a, replace: {}"), "a bracket is not closed: } is missing"),
+        (("generate", DOMINO, "--cfg", "job", "-p", "certify"), "--cfg shows the whole configuration; leave -p out"),
     ],
 )
 def test_several_values_where_one_is_taken_have_a_remedy(asked, says, capsys):

@@ -21,6 +21,8 @@ from scengen.evaluate.threshold.search import Search
 from scengen.evaluate.threshold.settings import ThresholdSettings
 from scengen.evaluate.threshold.shift import Shift
 from scengen.evaluate.threshold.simulation import simulate
+from scengen.evidence import ledger
+from scengen.evidence.ledger import Evidence
 from scengen.pool import Pool
 from scengen.pool.collection import write_index
 from scengen.tasks.domino_single import DominoSingle
@@ -197,7 +199,15 @@ def test_levels_are_equal_parts_of_an_axis_and_of_a_perturbation():
     assert Shift.of("domino_single", "wide_gaps", 2).value(2).startswith("gap_ratio 1.89")
 
 
-def test_the_oracle_is_shown_in_levels():
+def test_the_oracle_is_shown_in_levels(monkeypatch):
+    """Cards of axes as `scengen measure kind=axis` stores them."""
+    stored = {"low_starter": "1.29 [0.83, 1.66], starter.height 0.0413", "wide_gaps": "4.27 [2.19, 6.48], gap_ratio 2"}
+    cards = {
+        axis: Evidence("domino_single", 2, axis, "axis", 20, {"boundaries": {"oracle": boundary}}, {}, "0")
+        for axis, boundary in stored.items()
+    }
+    latest = ledger.latest
+    monkeypatch.setattr(ledger, "latest", lambda kind, task: cards if kind == "axis" else latest(kind, task))
     assert Shift.of("domino_single", "low_starter").oracle.startswith("the oracle breaks at level 6.5 [4.1, 8.3]")
     assert Shift.of("domino_single", "low_starter", 10).oracle.startswith("the oracle breaks at level 12.9 [8.3, 16.6]")
     limited = Shift.of("domino_single", "wide_gaps").oracle  # its fifth level is the limit of an earlier card

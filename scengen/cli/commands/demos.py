@@ -8,9 +8,9 @@ from typing import Any
 
 from rich.table import Table
 
-from ...compose import Combination, combinations
+from ...compose import Combination, combinations, each_checked
 from ...demos.generate import STEPS, DemosSettings, DemosSummary, generate_demonstrations
-from ...errors import BadConfig, ScengenError
+from ...errors import BadConfig
 from ...runs.journal import begun
 from ...runs.progress import ProgressBar
 from ...samplers.task import Task
@@ -58,7 +58,7 @@ class Run:
 
 def command(arguments: Arguments) -> int:
     requested = combinations("demos", arguments)
-    runs = [_checked(one, len(requested) > 1) for one in requested]
+    runs = each_checked(requested, lambda one: _checked(one, len(requested) > 1), "nothing was made")
     folder, times = Counter(run.settings.to for run in runs).most_common(1)[0]
     if times > 1:
         others = [name for name in requested[0].swept if name not in ("task", "split")]
@@ -82,18 +82,9 @@ def _plain(summary: DemosSummary) -> dict[str, Any]:
 
 
 def _checked(requested: Combination, several: bool) -> Run:
-    """The run of a combination, checked before any run starts, with a folder below to= if there are several.
-
-    Raises:
-        BadConfig: the combination is not valid; the message names it.
-    """
-    try:
-        settings, task, certify_settings = read_task("demos", requested.overrides, DemosSettings)
-        settings.check(task)
-    except ScengenError as error:
-        if not several:
-            raise
-        raise BadConfig(f"{requested}: {error}; nothing was made; leave this combination out") from None
+    """The run of a combination, checked before any run starts, with a folder below to= if there are several."""
+    settings, task, certify_settings = read_task("demos", requested.overrides, DemosSettings)
+    settings.check(task)
     if several:
         name = f"{task.name}-{settings.split}" + ("" if settings.to else "-demos")
         settings = replace(settings, to=str(Path(settings.to or GENERATED, name)))

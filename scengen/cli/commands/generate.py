@@ -2,18 +2,17 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 from rich.table import Table
 
-from ...compose import Combination, combinations
-from ...errors import BadConfig, ScengenError, cut
+from ...compose import Combination, combinations, each_checked
+from ...errors import BadConfig, cut
 from ...perturb.perturbation import NONE, Perturbation
 from ...pool import Pool, collection
-from ...pool.kinds import marks
+from ...pool.kinds import check_target, marks
 from ...pool.manifest import MANIFEST
 from ...runs.generate import GenerateSettings, Summary, generate
 from ...runs.journal import begun
@@ -27,8 +26,6 @@ from ...work.targets import try_file
 from ..tables import attack_table, funnel_table, in_words, summary_lines
 from . import FAILED, OK, Arguments, err, intake, out, say, say_begun, warn, write_json
 from .settings import read_task
-
-T = TypeVar("T")
 
 GENERATED = "generated"
 """Default folder of the pools of a sweep."""
@@ -118,9 +115,9 @@ def command(arguments: Arguments) -> int:
         summaries.append(run())
         collection.write_index(summaries[-1].pool.folder.parent, [summaries[-1].pool])
     out.print(_table(requested, runs, summaries))
-    folder = summaries[-1].pool.folder.parent
-    use = f"pool={folder} stands for all pools in it"
-    say(f"wrote {folder / collection.INDEX}: {use}, in verify, show, report, evaluate")
+    for folder in dict.fromkeys(summary.pool.folder.parent for summary in summaries):
+        use = f"pool={folder} stands for all pools in it"
+        say(f"wrote {folder / collection.INDEX}: {use}, in verify, show, report, evaluate")
     if runs[0].settings.json:
         write_json(runs[0].settings.json, [summary.plain() for summary in summaries])
     short = any(summary.certified < run.settings.n for run, summary in zip(runs, summaries, strict=True))
@@ -168,20 +165,18 @@ def _valid_runs(requested: Sequence[Combination]) -> tuple[list[Combination], li
     with a warning.
 
     Raises:
-        BadConfig: a combination is not valid; the message names it.
+        ScengenError: a combination is not valid; the message names it.
     """
-    runs = [_checked(one, _run) for one in requested]
-    kept, lacking = [], []
-    for one, run in zip(requested, runs, strict=True):
-        missing = _checked(one, lambda _, run=run: _missing(run))
-        if missing and any(missing <= other.task.axes.keys() for other in runs):
-            lacking.append(str(one))
-        else:
-            _checked(one, lambda _, run=run: run.settings.check(run.task))
-            kept.append((one, run))
-    if lacking:
-        warn(f"scengen: left out, because the task has no such split: {', '.join(lacking)}", "yellow")
-    return [one for one, _ in kept], [run for _, run in kept]
+    told = "no pool was made"
+    runs = {str(one): run for one, run in zip(requested, each_checked(requested, _run, told), strict=True)}
+    missing = each_checked(requested, lambda one: _missing(runs[str(one)]), told)
+    foreign = [any(each <= run.task.axes.keys() for run in runs.values()) if each else False for each in missing]
+    kept = [one for one, elsewhere in zip(requested, foreign, strict=True) if not elsewhere]
+    each_checked(kept, lambda one: runs[str(one)].settings.check(runs[str(one)].task), told)
+    if len(kept) < len(requested):
+        lacking = ", ".join(str(one) for one in requested if one not in kept)
+        warn(f"scengen: left out, because the task has no such split: {lacking}", "yellow")
+    return kept, [runs[str(one)] for one in kept]
 
 
 def _missing(run: Run) -> set[str]:
@@ -190,27 +185,20 @@ def _missing(run: Run) -> set[str]:
     return {part.axis for part in parts} - run.task.axes.keys()
 
 
-def _checked(requested: Combination, look: Callable[[Combination], T]) -> T:
-    """Apply a function to a combination.
-
-    Raises:
-        BadConfig: the combination is not valid; the message names it.
-    """
-    try:
-        return look(requested)
-    except ScengenError as error:
-        raise BadConfig(f"{requested}: {error}; no pool was made; leave this combination out") from None
-
-
 def _with_folders(requested: Sequence[Combination], runs: Sequence[Run]) -> list[Run]:
-    """The runs with folders below that of pool=: `<task>-<split>` and the other swept settings.
+    """The runs with their folders: pool=, if each has another there, or below it `<task>-<split>` and other settings.
 
     Raises:
         BadConfig: two runs have the same folder.
+        PoolError: the index cannot stand beside a pool, because the folder is something else.
     """
+    named = [Path(run.settings.pool or GENERATED) for run in runs]
+    apart = len({*named}) == len(runs) > 1
     folders = [
-        Path(run.settings.pool or GENERATED, _folder_name(one, run)) for one, run in zip(requested, runs, strict=True)
+        path if apart else path / _folder_name(one, run) for path, one, run in zip(named, requested, runs, strict=True)
     ]
+    for folder in folders:
+        check_target(folder.parent, collection.INDEX, "pool")
     folder, times = Counter(folders).most_common(1)[0]
     if times > 1:
         raise BadConfig(f"{times} of the combinations would be written to {folder}; give each value once")

@@ -49,6 +49,11 @@ def read_task(verb: str, overrides: Sequence[str], kind: type[T]) -> tuple[T, Ta
             f"certify.name = {cut(certify_settings.name)}; verify knows {', '.join(known)} and prints what differs "
             "from them; let the file of a level start with `defaults: [quick]`, and leave its name out"
         )
+    if certify_settings.falls_short(level := known[certify_settings.name]):
+        raise BadConfig(
+            f"certify.robust.bound = {certify_settings.robust.bound:g}; certificates of level {level.name} have "
+            f"{level.robust.bound:g} or more, and verify refutes others; take certify=quick, whose bound may be lower"
+        )
     return settings, task, certify_settings
 
 

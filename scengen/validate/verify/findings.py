@@ -112,7 +112,7 @@ class Findings:
         else:
             other = ", ".join(d["key"] for d in differences(asdict(known), asdict(settings)))
             self.settings = f"own settings ({settings.name}, except for {other})"
-            if settings.name != "quick" and settings.robust.bound < known.robust.bound:
+            if settings.falls_short(known):
                 bounds = f"{known.robust.bound:g}, and not {settings.robust.bound:g}"
                 told = f"the settings are called {settings.name}, whose bound of the robust check is {bounds}"
                 self.of_pool(MANIFEST, "refuted", told)
