@@ -152,6 +152,10 @@ def run(argv: Sequence[str], signals: Signals | None = None) -> int:
     Returns:
         Exit status: 0 success, 1 a check failed, 2 bad input or a fault of the machine, 3 no verdict, 130 interrupted.
     """
+    if isinstance(argv, str) or not all(isinstance(word, str) for word in argv):
+        what = f"{cut(argv)!r}" if isinstance(argv, str) else repr(next(w for w in argv if not isinstance(w, str)))
+        _print_error(f"scengen: {cut(what)}; give the command as a list of texts, as in ['tasks', 'task=packing']")
+        return BAD_INPUT
     try:
         return _run(argv, signals)
     except KeyboardInterrupt:

@@ -12,6 +12,7 @@ A factory may declare what its policies need, as attributes (of a class, class a
 import hashlib
 import inspect
 import sys
+import uuid
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -35,7 +36,7 @@ from ..pool.library import Library
 from ..samplers.task import Task
 from ..sim.arm import IDLE
 from ..sim.embodiment import hands
-from ..work.foreign import at_fault, factory_of, is_factory
+from ..work.foreign import at_fault, factory_of, is_factory, is_typed
 from .remote.client import ClientSettings, is_address
 from .remote.policy import RemotePolicy
 
@@ -290,13 +291,16 @@ def identity(name: str, factory: Factory, policy: Policy) -> str:
     """Hash of a policy's attribute or method `identity` or `version`; of its source if it has neither.
 
     The source of a policy is the file of its factory and those of its class and bases, each with all Python files of
-    its package. Weights in other files are not included: a policy that loads weights should declare their version.
+    its package. Weights in other files are not included: a policy that loads weights should declare their version. A
+    policy that was typed into a session, such as a notebook's, has no file and is another one at each call.
     """
     for attribute in ("identity", "version"):
         if (said := getattr(policy, attribute, None)) is not None:
             with policy_errors(name, f"its {attribute}"):
                 said = said() if callable(said) else said
             return _sha(f"{attribute} {said!r}".encode())
+    if any(map(is_typed, (factory, type(policy)))):
+        return _sha(uuid.uuid4().bytes)
     files: set[Path] = set()
     for code in (factory, *type(policy).__mro__):
         module = sys.modules.get(getattr(code, "__module__", ""))

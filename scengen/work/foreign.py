@@ -1,6 +1,7 @@
 """Code of users that a setting names as `module:factory`."""
 
 import importlib
+import multiprocessing
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,19 @@ def is_factory(name: str) -> bool:
     """Whether a text is spelled `module:factory`."""
     module, colon, factory = name.partition(":")
     return bool(colon and factory.isidentifier() and all(map(str.isidentifier, module.split("."))))
+
+
+def is_typed(code: Any) -> bool:
+    """Whether a function or class was typed into a session, such as a notebook's, instead of read from a file."""
+    if getattr(code, "__module__", None) != "__main__":
+        return False
+    made = [found.co_filename for part in (code, *vars(code).values()) if (found := getattr(part, "__code__", None))]
+    written = getattr(sys.modules["__main__"], "__file__", None) is not None
+    return not written or any(file != GENERATED and not Path(file).is_file() for file in made)
+
+
+GENERATED = "<string>"
+"""File of functions that a decorator writes, such as `dataclass`."""
 
 
 def factory_of(setting: str, name: str) -> Callable[..., Any]:
@@ -37,6 +51,9 @@ def factory_of(setting: str, name: str) -> Callable[..., Any]:
         raise at_fault(setting, name, "its module cannot be imported", error) from error
     except Exception as error:
         raise at_fault(setting, name, "its module cannot be imported", error) from error
+    if not callable(found) and module == "__main__" and multiprocessing.parent_process():
+        told = "a worker does not see what was typed into a session; give workers=1, or write it into a file"
+        raise BadConfig(f"{setting} = {cut(name)}; {told}")
     if not callable(found):
         raise BadConfig(f"{setting} = {cut(name)}; {module} has no function or class named {factory!r}")
     return found

@@ -294,3 +294,8 @@ def test_pipes_and_endless_files_among_tasks_are_passed_over_or_refused(tmp_path
     capsys.readouterr()
     assert cli.run(given) == 2
     assert "endless.yaml has 1000000000000 bytes; a task file has at most" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", ["tasks task=packing", ["evaluate", pytest]])
+def test_what_is_no_list_of_texts_is_told(capsys, words):
+    assert cli.run(words) == 2 and "give the command as a list of texts" in capsys.readouterr().err
