@@ -4,11 +4,13 @@
 """
 
 import difflib
+import inspect
 import traceback
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 
 class ScengenError(Exception):
@@ -149,6 +151,12 @@ def place_of(error: BaseException) -> str:
         if _is_foreign(frame.f_code.co_filename, _package(frame)):
             return f"{_shown(frame.f_code.co_filename)}, line {line}, in {frame.f_code.co_name}"
     return ""
+
+
+def where_written(code: Callable[..., Any]) -> str:
+    """The place at which a function begins, such as `task.py, line 3, in build`."""
+    written = inspect.unwrap(code).__code__
+    return f"{_shown(written.co_filename)}, line {written.co_firstlineno}, in {written.co_name}"
 
 
 def _package(frame: FrameType) -> str:

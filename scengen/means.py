@@ -77,6 +77,8 @@ class Watch:
         if len(means) > MAX_MEANS:
             raise ValueError(f"a task has at most {MAX_MEANS} means, not {len(means)}")
         self.means, self.world = means, world
+        self.unknown: UnknownName | None = None
+        """The first name that a mean asked for and the scene does not have."""
         self._numbers = {name: number for number, name in enumerate(means)}
         self._order = [(number, mean, self._numbers.get(mean.after)) for number, mean in enumerate(means.values())]
 
@@ -85,7 +87,10 @@ class Watch:
         world, shown = self.world, self.world.shown
         for number, mean, before in self._order:
             if shown.item(number) == OPEN and (before is None or shown.item(before) == SHOWN):
-                shown[number] = mean.found(world)
+                try:
+                    shown[number] = mean.judge(world)
+                except UnknownName as error:
+                    shown[number], self.unknown = MISSED, self.unknown or error
 
     def found(self) -> dict[str, float]:
         """What is found out about each mean so far: `OPEN`, `SHOWN` or `MISSED`."""

@@ -24,6 +24,8 @@ from .embodiment import JAW, all_hands, compose, hands
 from .memory import Memory
 from .style import Style
 
+ROBOTS_BODIES = ("robot", "gripper", "fixed_mount")
+"""Beginnings of the names of bodies of robots."""
 MAX_MEANS = 12
 """Largest number of means of a task."""
 BODY = mujoco.mjtObj.mjOBJ_BODY
@@ -380,7 +382,8 @@ class World:
         try:
             return self._bodies[name]
         except KeyError:
-            raise UnknownName("body", name, self._bodies) from None
+            own = [known for known in self._bodies if not known.startswith(ROBOTS_BODIES)]
+            raise UnknownName("body", name, self._bodies if name.startswith(ROBOTS_BODIES) else own) from None
 
     @functools.cached_property
     def _bodies(self) -> dict[str, int]:

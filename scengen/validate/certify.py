@@ -12,7 +12,7 @@ from .. import html_tables
 from ..certificate import CHECKS, NOT_CHECKED, Certificate, Check
 from ..control.loop import Loop
 from ..episode import PAPER, Actions, Episode
-from ..errors import BadConfig, ScengenError
+from ..errors import BadConfig, ScengenError, where_written
 from ..geometry import Mat3, Vec3
 from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
@@ -156,6 +156,9 @@ class Trial:
             self.text = posed(text, self.scenario.conditions, self.scenario.under(None).id)
             self.world = self._load()
         except (ScengenError, ValueError) as error:
+            if "repeated name" in str(error):  # in every draw
+                where = where_written(type(self.scenario).build)
+                raise BadConfig(f"{where}: {_one_line(error)}; give each its own name") from None
             return {}, {}, f"the scene does not compile: {_one_line(error)}"
         counts = {
             "bodies": self.world.model.nbody,

@@ -308,6 +308,8 @@ def _play(
         return episode.step(actions[-1])
 
     def ended(outcome: Outcome, reason: str, at: float) -> Rollout:
+        if episode.lacks and episode.means.unknown and isinstance(source, _Planned):
+            raise episode.means.unknown  # a witness is also played in scenes without the things that help
         played = np.array(actions, np.float32).reshape(-1, world.size)
         about = (source.note, episode.lacks, world.loop.converged, source.filtered)
         return Rollout(outcome, reason, round(at, 6), played, world.digest, *about)
