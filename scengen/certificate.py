@@ -81,6 +81,10 @@ class Certificate:
     checks: tuple[Check, ...]
     """Checks in the order in which they ran."""
 
+    def __repr__(self) -> str:
+        passed = sum(check.passed for check in self.checks)
+        return f"Certificate({self.verdict}, level {self.settings}, {passed} of {len(self.checks)} checks passed)"
+
     def __getitem__(self, name: str) -> Check:
         """The check of that name."""
         return next(check for check in self.checks if check.name == name)

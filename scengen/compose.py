@@ -61,7 +61,11 @@ def load_task(name: str, search: Sequence[str] = ()) -> Task:
 
     Raises:
         UnknownName: there is no such file.
+        BadConfig: the search path is not made of overrides.
     """
+    if isinstance(search, str) or (bare := [text for text in search if "=" not in text]):
+        given = search if isinstance(search, str) else bare[0]
+        raise BadConfig(f"search = {cut(given)}; give a list of overrides, as in ['hydra.searchpath=FOLDER']")
     if name not in (known := tasks(search_path(search))):
         raise UnknownName("task", name, known)
     return _loaded(name, search) if search else _loaded_once(name, packages())
@@ -438,6 +442,8 @@ def _check_override(verb: str, text: str) -> None:
 def _one_by_one(verb: str, override: Override) -> str:
     """What to give instead of several values of a setting, to a command that takes one."""
     key = override.get_key_element()
+    if verb in SWEEPING:
+        return "one combination is shown at a time; give one"
     if override.value_type is ValueType.SIMPLE_CHOICE_SWEEP and verb == "new":
         return "give one"
     try:
@@ -540,11 +546,11 @@ class Combination:
         return " ".join(f"{key}={value}" for key, value in self.swept.items())
 
 
-def each_checked(requested: Sequence[Combination], look: Callable[[Combination], T], told: str) -> list[T]:
+def each_checked(requested: Sequence[Combination], look: Callable[[Combination], T], nothing: str) -> list[T]:
     """Apply a function to all combinations.
 
     Args:
-        told: what was not made.
+        nothing: what a message says was not made.
 
     Raises:
         ScengenError: no combination is valid, for the same reason.
@@ -561,7 +567,7 @@ def each_checked(requested: Sequence[Combination], look: Callable[[Combination],
     first, error = next(iter(errors.items()))
     if len(errors) == len(requested) and len({*map(str, errors.values())}) == 1:
         raise error
-    raise BadConfig(f"{first}: {error}; {told}; leave this combination out")
+    raise BadConfig(f"{first}: {error}; {nothing}; leave this combination out")
 
 
 def combinations(verb: str, overrides: Sequence[str]) -> list[Combination]:

@@ -48,6 +48,7 @@ class UnknownName(ScengenError):
 
 REMEDIES = {
     "task": "hydra.searchpath=FOLDER adds the folder that holds your task/NAME.yaml",
+    "split in these pools": "scengen generate split=NAME makes a pool of another split",
     "certify": "hydra.searchpath=FOLDER adds the folder that holds your certify/NAME.yaml",
 }
 """Remedies for unknown names, by kind."""
@@ -154,7 +155,7 @@ def place_of(error: BaseException) -> str:
 
 
 def where_written(code: Callable[..., Any]) -> str:
-    """The place at which a function begins, such as `task.py, line 3, in build`."""
+    """The place of the first line of a function, such as `task.py, line 3, in build`."""
     written = inspect.unwrap(code).__code__
     return f"{_shown(written.co_filename)}, line {written.co_firstlineno}, in {written.co_name}"
 

@@ -16,12 +16,15 @@ EACH_AXIS: tuple[Kind, ...] = ("axis", "belief")
 
 
 def evidence_table(task: Task) -> Table:
-    """One line for each kind: the splits that were measured on today's version of a task, and those that were not."""
-    title = f"evidence: measured on version {task.version}"
-    table = Table("kind", "splits", "n", "not measured on this version", title=title, title_justify="left")
-    draws = cache(partial(_draws_of, task))
+    """One line for each kind of measurement of a task: the splits that were measured on today's version, and what is
+    not of it. Kinds without any row are below the table."""
+    title = f"evidence about version {task.version}; scengen help measure explains the kinds"
+    table = Table("kind", "splits", "n", "not of this version", title=title, title_justify="left")
+    draws, never = cache(partial(_draws_of, task)), []
     for kind in KINDS:
-        rows = read(kind, task.name)
+        if not (rows := read(kind, task.name)):
+            never.append(kind)
+            continue
         named = [row for row in rows if row.version == task.version]
         today = [row for row in named if row.draws == draws(row.split)]
         here = {row.split or "whole task" for row in today}
@@ -29,11 +32,12 @@ def evidence_table(task: Task) -> Table:
         missing = [split for split in wanted if split not in here]
         others = sorted({row.version for row in rows} - {task.version})
         lacking = [f"{len(missing)} of {len(wanted)}: {', '.join(missing)}"] if here and missing else []
-        lacking += [] if here else [f"not measured on version {task.version}"]
-        lacking += [f"measured on version {', '.join(map(str, others))}"] if others else []
+        lacking += [f"all on version {', '.join(map(str, others))}"] if others and not here else []
         false = sorted({row.split or "whole task" for row in named if row not in today})
         lacking += [f"on other draws: {', '.join(false)}"] if false else []
         table.add_row(kind, _names(task, here), str(sum(row.n for row in today)), "; ".join(lacking))
+    if never:
+        table.caption, table.caption_justify = f"not measured: {', '.join(never)}", "left"
     return table
 
 

@@ -288,6 +288,9 @@ class InlineFilm:
     content: bytes
     """Animated WebP, which repeats."""
 
+    def __repr__(self) -> str:
+        return f"InlineFilm({len(self.content)} bytes)"
+
     def _repr_html_(self) -> str:
         return f'<img src="{address(self.content, "webp")}" alt="film of a rollout">'
 

@@ -54,7 +54,7 @@ REFERENCE = "pool=generated/reference/domino_single-id"
         (("verify", REFERENCE, "ycb=here"), "holds no scans; leave it out"),
         (("tasks", "hydra.searchpath=[pkg://nope.nope]"), "there is no folder pkg://nope.nope; give one"),
         (("tasks", "hydra.searchpath=[pkg://nope]"), "there is no folder pkg://nope; give one"),
-        (("generate", "task=packing", "hydra.searchpath=[file:///nowhere]"), "there is no folder file:///nowhere"),
+        (("generate", "task=packing", "hydra.searchpath=[file:///nowhere]"), "there is no folder /nowhere"),
         (("show", "film", REFERENCE, "id=8ed4", "to=x.png", "raw=true"), "raw = true plays a shortcut"),
     ],
 )

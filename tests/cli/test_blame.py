@@ -26,6 +26,10 @@ class Mine(DominoSingle):
 
     {code}
 """
+MEAN = (
+    "means = lambda self: {'it falls': __import__('scengen.means', fromlist=['once'])"
+    ".once(lambda world: world.touched('slap', 'tile_0'))}"
+)
 
 
 @pytest.fixture
@@ -48,6 +52,7 @@ def written(tmp_path, monkeypatch):
     [
         ("joint", "success = lambda self, world: world.data.joint('nope').qpos[0] > 0", "in <lambda>: KeyError: "),
         ("body", "failure = lambda self, world: str(world.pos('slap'))", "in <lambda>: no body named 'slap' (did you"),
+        ("mean", MEAN, "in <lambda>: no body named 'slap' (did you mean 'slab'?); known: slab, table, tile_0"),
         ("attribute", "constraints = lambda self: iter([self.tlie.mass])", "in <lambda>: AttributeError: "),
         ("nothing", "oracle = lambda self, world: 1 / 0", "in <lambda>: ZeroDivisionError: division by zero"),
     ],
@@ -56,7 +61,15 @@ def test_an_error_of_a_family_names_its_file_and_line(written, capsys, module, c
     assert cli.run(["try", *written(module, code)]) == 2
     shown = capsys.readouterr().err
     assert f"scengen: {module}.py, line 7, {told}" in shown and "please report" not in shown
-    assert ("is not scengen's code" in shown) == (module != "body"), "an error that scengen foresees is one sentence"
+    foreseen = module in ("body", "mean")
+    assert ("is not scengen's code" in shown) != foreseen, "an error that scengen foresees is one sentence"
+
+
+def test_a_name_that_stands_twice_in_a_scene_ends_the_first_draw(written, tmp_path, capsys):
+    twice = "build = lambda self: (s := super(Mine, self).build(), s.worldbody.add_body(name='slab'))[0]"
+    assert cli.run(["generate", *written("twice", twice), "n=1", f"pool={tmp_path / 'pool'}"]) == 2
+    shown = capsys.readouterr().err
+    assert "scengen: twice.py, line 7, in <lambda>: " in shown and "repeated name 'slab' in body; give each" in shown
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from scengen.cli.commands.settings import read_task
 from scengen.cli.completion import BASH, completions
 from scengen.cli.usage import usage
 from scengen.cli.verbs import parsed
-from scengen.errors import UnknownName
+from scengen.errors import BadConfig, UnknownName
 from scengen.pool import Pool
 from scengen.samplers import task_files
 
@@ -299,3 +299,18 @@ def test_pipes_and_endless_files_among_tasks_are_passed_over_or_refused(tmp_path
 @pytest.mark.parametrize("words", ["tasks task=packing", ["evaluate", pytest]])
 def test_what_is_no_list_of_texts_is_told(capsys, words):
     assert cli.run(words) == 2 and "give the command as a list of texts" in capsys.readouterr().err
+
+
+def test_tasks_of_a_category_are_listed_alone(capsys):
+    status, shown = said(capsys, "tasks", "task=P3")
+    assert status == 0 and shown.out.startswith("6 tasks") and "packing" not in shown.out
+    status, shown = said(capsys, "tasks", "task=P9")
+    assert status == 2 and "no category named 'P9'" in shown.err
+    status, shown = said(capsys, "generate", DOMINO, "split=id,diagonal", "--cfg", "job")
+    assert status == 2 and "one combination is shown at a time; give one" in shown.err
+
+
+@pytest.mark.parametrize("search", ["folder", ["folder"]])
+def test_a_search_path_without_its_setting_is_not_ignored(search):
+    with pytest.raises(BadConfig, match="search = folder; give a list of overrides, as in .'hydra.searchpath=FOLDER'"):
+        compose.load_task("domino_single", search)

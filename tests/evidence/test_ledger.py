@@ -204,10 +204,13 @@ def test_the_terminal_tells_what_was_not_measured(of_another_version, capsys, mo
     monkeypatch.setenv("COLUMNS", "200")
     assert run(("tasks", f"task={TASK.name}")) == 0
     told = capsys.readouterr().out
-    lines = told.partition("evidence: measured on version 1")[2].splitlines()
-    for kind in {row.kind for row in ROWS if row.task == TASK.name}:
+    lines = told.partition("evidence about version 1")[2].splitlines()
+    kinds = {row.kind for row in ROWS if row.task == TASK.name}
+    for kind in kinds:
         [line] = [line for line in lines if f" {kind} " in line]
-        assert "not measured on version 1; measured on version 7" in line
+        assert "all on version 7" in line
+    [never] = [line for line in lines if line.startswith("not measured: ")]
+    assert {*never.strip().removeprefix("not measured: ").split(", ")} == {*KINDS} - kinds
     assert run(("tasks",)) == 0
     [line] = [line for line in capsys.readouterr().out.splitlines() if " domino_single " in line]
     assert " of " not in line

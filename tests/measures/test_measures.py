@@ -47,7 +47,7 @@ def test_a_foreign_task_has_a_ledger_of_its_own_and_the_same_tables(tmp_path, co
     assert "nothing is missing" in capsys.readouterr().out
     assert (tmp_path / "certified" / "push_block.jsonl").read_text().count("\n") == len(counted) - 1
     assert cli.run(("tasks", "task=push_block", f"records={tmp_path}", *SEARCH)) == 0
-    assert "certified" in capsys.readouterr().out.partition("evidence: measured on version 1")[2]
+    assert "certified" in capsys.readouterr().out.partition("evidence about version 1")[2]
     task = load_task("push_block", SEARCH)
     with ledger.opened(str(tmp_path), SEARCH):
         assert "| id | 3 of 4 | - | - |" in "\n".join(task_page.certification(task))

@@ -39,6 +39,11 @@ def say(text: str) -> None:
     out.print(printable(text), soft_wrap=True)
 
 
+def counted(number: int, what: str) -> str:
+    """A number of things: `1 scene`, `2 scenes`."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
 def warn(text: str, style: str = "red") -> None:
     """Print a line on standard error literally."""
     err.print(printable(text), style=style, soft_wrap=True)

@@ -14,7 +14,7 @@ from ...pool.library import Library
 from ...runs.progress import ProgressBar
 from ...work.parallel import UNTRUSTED_LIMITS, each
 from ...work.targets import clear_unfinished, try_folder
-from . import FAILED, OK, Arguments, chosen, err, filled, holder, one, say, several, warn
+from . import FAILED, OK, Arguments, chosen, counted, err, filled, holder, one, say, several, warn
 from .settings import read
 
 A = TypeVar("A")
@@ -58,7 +58,7 @@ def _scenes(settings: ExportSettings) -> int:
     rows = pool.rows(witness=False) if settings.id is None else [chosen(pool, settings.id)]
     work = partial(export, folder=Path(settings.to), robot=settings.robot)
     written, lost = _each(work, rows, len(pool) if settings.id is None else 1, settings.to)
-    say(f"wrote {len(written)} scenes to {settings.to}")
+    say(f"wrote {counted(len(written), 'scene')} to {settings.to}")
     return FAILED if lost else OK
 
 

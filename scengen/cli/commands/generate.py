@@ -186,7 +186,7 @@ def _missing(run: Run) -> set[str]:
 
 
 def _with_folders(requested: Sequence[Combination], runs: Sequence[Run]) -> list[Run]:
-    """The runs with their folders: pool=, if each has another there, or below it `<task>-<split>` and other settings.
+    """The runs, each with its own folder: that of pool= if these all differ, or one in it, named by what is swept.
 
     Raises:
         BadConfig: two runs have the same folder.

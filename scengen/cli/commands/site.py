@@ -14,7 +14,7 @@ from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
 from ...work.extras import module_of_extra
 from ...work.targets import try_folder
-from . import FAILED, OK, Arguments, err, filled, say, several, warn
+from . import FAILED, OK, Arguments, counted, err, filled, say, several, warn
 from .settings import read
 
 
@@ -43,7 +43,7 @@ def command(arguments: Arguments) -> int:
         built = module.build(shown, Path(settings.to), search, lambda done, _, what: bar.show(done, what))
     for name, why in built.failed.items():
         warn(f"scengen: {name} has no page: {why}")
-    made = f"{len(built.made)} tasks made, {len(built.kept)} up to date, {len(built.failed)} failed"
+    made = f"{counted(len(built.made), 'task')} made, {len(built.kept)} up to date, {len(built.failed)} failed"
     say(f"wrote {Path(settings.to) / 'index.html'}: {made}")
     return FAILED if built.failed else OK
 

@@ -1,5 +1,6 @@
 """list the tasks; for one task, its parameters, bounds, splits, axes and what was measured"""
 
+import re
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -30,13 +31,17 @@ class TasksSettings:
 
 
 def command(arguments: Arguments) -> int:
+    category = next(
+        (text.removeprefix("task=") for text in arguments if re.fullmatch(r"task=(P[1-9]|M|X)", text)), None
+    )
+    arguments = [text for text in arguments if text != f"task={category}"]
     settings, name = read("tasks", arguments, TasksSettings), compose.chosen_task("tasks", arguments)
     if settings.axes not in (None, PAPER):
         raise UnknownName("choice of axes", settings.axes, [PAPER])
     search = search_path(arguments)
     try_file(settings.json)
     with ledger.opened(settings.records, search):
-        data = _print(settings.axes, name, arguments)
+        data = _print(settings.axes, name, category, arguments)
     if settings.json:
         write_json(settings.json, data)
     if settings.records is not None and not settings.axes:
@@ -44,14 +49,17 @@ def command(arguments: Arguments) -> int:
     return OK
 
 
-def _print(axes: str | None, name: str | None, arguments: Arguments) -> Any:
-    """Print the tables of a task, or the list of tasks or of the paper's axes.
+def _print(axes: str | None, name: str | None, category: str | None, arguments: Arguments) -> Any:
+    """Print the tables of a task, or the list of tasks or of the paper's axes, of one category if it is given.
 
     Returns:
         The same as plain data.
     """
     search = search_path(arguments)
     listed = [about(each, search) for each in ([name] if name else task_files.tasks(search))]
+    if category and category not in (known := {task.category for task in listed}):
+        raise UnknownName("category", category, known)
+    listed = [task for task in listed if category in (None, task.category)]
     listed.sort(key=lambda task: (task.category[:1] != "P", task.category, task.code))  # the paper's, then ours
     if name is None and not axes:
         certified = {each.name: ledger.latest("certified", each.name) for each in listed}
