@@ -82,7 +82,7 @@ class Certificate:
     """Checks in the order in which they ran."""
 
     def __repr__(self) -> str:
-        passed = sum(check.passed for check in self.checks)
+        passed = sum(bool(check.passed) for check in self.checks)
         return f"Certificate({self.verdict}, level {self.settings}, {passed} of {len(self.checks)} checks passed)"
 
     def __getitem__(self, name: str) -> Check:

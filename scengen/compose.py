@@ -63,9 +63,8 @@ def load_task(name: str, search: Sequence[str] = ()) -> Task:
         UnknownName: there is no such file.
         BadConfig: the search path is not made of overrides.
     """
-    if isinstance(search, str) or (bare := [text for text in search if "=" not in text]):
-        given = search if isinstance(search, str) else bare[0]
-        raise BadConfig(f"search = {cut(given)}; give a list of overrides, as in ['hydra.searchpath=FOLDER']")
+    if bare := [search] if isinstance(search, str) else [text for text in search if "=" not in text]:
+        raise BadConfig(f"search = {cut(bare[0])}; give a list of overrides, as in ['hydra.searchpath=FOLDER']")
     if name not in (known := tasks(search_path(search))):
         raise UnknownName("task", name, known)
     return _loaded(name, search) if search else _loaded_once(name, packages())

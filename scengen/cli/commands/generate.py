@@ -190,7 +190,7 @@ def _with_folders(requested: Sequence[Combination], runs: Sequence[Run]) -> list
 
     Raises:
         BadConfig: two runs have the same folder.
-        PoolError: the index cannot stand beside a pool, because the folder is something else.
+        PoolError: the folder of the index is something else, such as a pool.
     """
     named = [Path(run.settings.pool or GENERATED) for run in runs]
     apart = len({*named}) == len(runs) > 1
