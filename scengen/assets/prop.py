@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..compat import set_multiccd
+from ..errors import UnknownName
 from ..geometry import UP, about_y, axes, compound, quat
 from ..params import check_bounds
 from ..robots.panda import HOME_HAND, HOME_TILT, IN_HAND
@@ -213,6 +214,18 @@ def place(
     carry(body, pos, quat("z", yaw) if turn is None else turn)
     if free:
         body.add_freejoint(name=f"{name}_free")
+
+
+def remove(scene: mujoco.MjSpec, name: str) -> None:
+    """Take a body out of a scene, as in an ablation.
+
+    Raises:
+        UnknownName: the scene does not have it.
+    """
+    body = scene.body(name)
+    if body is None:
+        raise UnknownName("body", name, [known.name for known in scene.bodies])
+    scene.delete(body)
 
 
 def place_in_hand(scene: mujoco.MjSpec, asset: Prop, name: str, width: float, offset: ArrayLike) -> None:

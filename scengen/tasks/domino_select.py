@@ -39,7 +39,7 @@ import numpy as np
 
 from ..assets.box import Domino
 from ..assets.chain import DECOY, DRIFT, GAP, MISSING, Chain, Defect, Lanes
-from ..assets.prop import TABLE_TOP, place, table
+from ..assets.prop import TABLE_TOP, place, remove, table
 from ..decisions import Decision, choice
 from ..geometry import UP, Vec3, about_z, heading, spoken
 from ..means import Mean, once, throughout
@@ -196,7 +196,7 @@ class DominoSelect(Scenario):
         """Remove all tiles of the intact chain but the first; the others might bridge the place of a missing tile."""
         scene = self.build()
         for i in range(1, self.count):
-            scene.delete(scene.body(f"tile_{self.intact_lane}_{i}"))
+            remove(scene, f"tile_{self.intact_lane}_{i}")
         return {"no_chain": scene}
 
     # --- decisions ---------------------------------------------------------------------------

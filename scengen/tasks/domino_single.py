@@ -22,7 +22,7 @@ import mujoco
 import numpy as np
 
 from ..assets.box import Domino
-from ..assets.prop import TABLE_TOP, place, table
+from ..assets.prop import TABLE_TOP, place, remove, table
 from ..decisions import Decision, choice, near
 from ..geometry import UP, Vec3, heading, spoken
 from ..means import Mean, once, throughout
@@ -164,7 +164,7 @@ class DominoSingle(Scenario):
         """Remove all tiles but the first; the others might still bridge the place of a single missing tile."""
         scene = self.build()
         for i in range(1, self.count):
-            scene.delete(scene.body(f"tile_{i}"))
+            remove(scene, f"tile_{i}")
         return {"no_chain": scene}
 
     # --- decisions ---------------------------------------------------------------------------

@@ -45,7 +45,7 @@ import numpy as np
 
 from ..assets.box import Cube
 from ..assets.patch import Patch
-from ..assets.prop import TABLE_TOP, Rgba, place, table
+from ..assets.prop import TABLE_TOP, Rgba, place, remove, table
 from ..control.loop import Loop
 from ..decisions import Decision, around, choice
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, between, corners, gap, heading, least_gap
@@ -257,7 +257,7 @@ class IndirectPush(Scenario):
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Remove the block at the head of the chain: the others fall short by its length."""
         scene = self.build()
-        scene.delete(scene.body(self.chosen[0]))
+        remove(scene, self.chosen[0])
         return {"one_block_less": scene}
 
     # --- decisions ---------------------------------------------------------------------------

@@ -36,7 +36,7 @@ from ..assets.ball import Ball
 from ..assets.barrier import Barrier, let_pass
 from ..assets.bin import Bin
 from ..assets.crowned_ramp import CrownedRamp
-from ..assets.prop import TABLE_TOP, place, table
+from ..assets.prop import TABLE_TOP, place, remove, table
 from ..decisions import Decision, choice, near, side_of, span
 from ..errors import GaveUp
 from ..geometry import UP, Mat3, Outline, Vec3, about_z, corners, gap, way_to
@@ -291,7 +291,7 @@ class RampSort(Scenario):
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         bare = self.build()
-        bare.delete(bare.body("ramp"))
+        remove(bare, "ramp")
         return {"no_ramp": bare, "bins_exchanged": self._scene(-self.red_side)}
 
     # --- decisions ---------------------------------------------------------------------------

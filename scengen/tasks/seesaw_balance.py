@@ -39,7 +39,7 @@ import mujoco
 import numpy as np
 
 from ..assets.box import Block
-from ..assets.prop import TABLE_TOP, place, table
+from ..assets.prop import TABLE_TOP, place, remove, table
 from ..assets.seesaw import Seesaw, standing
 from ..decisions import Decision, around, choice, near
 from ..errors import GaveUp
@@ -263,7 +263,7 @@ class SeesawBalance(Scenario):
 
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         scene = self.build()
-        scene.delete(scene.body("weight"))
+        remove(scene, "weight")
         return {"no_counterweight": scene}
 
     # --- decisions ---------------------------------------------------------------------------

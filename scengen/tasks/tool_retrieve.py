@@ -32,7 +32,7 @@ import numpy as np
 
 from ..assets.box import Cube
 from ..assets.hook import Hook, JHook, LHook, THook
-from ..assets.prop import TABLE_TOP, place, table
+from ..assets.prop import TABLE_TOP, place, remove, table
 from ..decisions import Decision, choice, near, side_of
 from ..geometry import UP, Vec3, about_y, about_z, corners, heading, polar, way_to
 from ..means import Mean, when
@@ -229,7 +229,7 @@ class ToolRetrieve(Scenario):
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """Remove the hook, so that nothing reaches the cube; remove its tip, so that nothing pulls the cube."""
         bare, straight = self.build(), self.build()
-        bare.delete(bare.body("hook"))
+        remove(bare, "hook")
         for i in range(1, len(self.tool.bars)):
             straight.delete(straight.geom(f"hook/bar_{i}"))
         return {"no_hook": bare, "no_tip": straight}

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from scengen.assets.box import Block, Cube
 from scengen.assets.patch import Patch
-from scengen.assets.prop import TABLE_TOP, place, table
+from scengen.assets.prop import TABLE_TOP, place, remove, table
 from scengen.decisions import Decision, around
 from scengen.geometry import UP, Vec3, heading
 from scengen.means import Mean, when
@@ -125,7 +125,7 @@ class PushOff(Scenario):
     def ablations(self) -> Mapping[str, mujoco.MjSpec]:
         """No block; `success` and `failure` must therefore not refer to it."""
         scene = self.build()
-        scene.delete(scene.body("block"))
+        remove(scene, "block")
         return {"no_block": scene}
 
     # --- decisions: what a solution depends on, for scengen axis cues -----------------------------

@@ -30,6 +30,11 @@ MEAN = (
     "means = lambda self: {'it falls': __import__('scengen.means', fromlist=['once'])"
     ".once(lambda world: world.touched('slap', 'tile_0'))}"
 )
+TWICE = "build = lambda self: (s := super(Mine, self).build(), s.worldbody.add_body(name='slab'))[0]"
+ABLATED = (
+    "ablations = lambda self: {'gone': __import__('scengen.assets.prop', fromlist=['remove'])"
+    ".remove(super(Mine, self).build(), 'slap')}"
+)
 
 
 @pytest.fixture
@@ -65,11 +70,17 @@ def test_an_error_of_a_family_names_its_file_and_line(written, capsys, module, c
     assert ("is not scengen's code" in shown) != foreseen, "an error that scengen foresees is one sentence"
 
 
-def test_a_name_that_stands_twice_in_a_scene_ends_the_first_draw(written, tmp_path, capsys):
-    twice = "build = lambda self: (s := super(Mine, self).build(), s.worldbody.add_body(name='slab'))[0]"
-    assert cli.run(["generate", *written("twice", twice), "n=1", f"pool={tmp_path / 'pool'}"]) == 2
+@pytest.mark.parametrize(
+    ("module", "code", "told"),
+    [
+        ("twice", TWICE, "repeated name 'slab' in body; give each its own name"),
+        ("ablated", ABLATED, "no body named 'slap' (did you mean 'slab'?); known: "),
+    ],
+)
+def test_a_wrong_name_in_a_scene_ends_the_first_draw(written, tmp_path, capsys, module, code, told):
+    assert cli.run(["generate", *written(module, code), "n=1", f"pool={tmp_path / 'pool'}"]) == 2
     shown = capsys.readouterr().err
-    assert "scengen: twice.py, line 7, in <lambda>: " in shown and "repeated name 'slab' in body; give each" in shown
+    assert f"scengen: {module}.py, line 7, in <lambda>: " in shown and told in shown
 
 
 @pytest.mark.parametrize(
