@@ -43,7 +43,7 @@ class UnknownName(ScengenError):
         close = f" (did you mean {meant!r}?)" if meant else nearest(name, names)
         also = "".join(f", nor {cut(repr(other))}{nearest(other, names)}" for other in others)
         listed, remedy = ", ".join(names) or "(none)", f"; {REMEDIES[kind]}" if kind in REMEDIES else ""
-        super().__init__(f"no {kind} named {cut(repr(name))}{close}{also}; known: {listed}{remedy}")
+        super().__init__(f"no {kind} named {cut(repr(name))}{close}{also}{remedy}; known: {listed}")
 
 
 REMEDIES = {

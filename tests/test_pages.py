@@ -14,7 +14,7 @@ from scengen.site import task_page
 ROOT = build_docs.ROOT
 PAGES = [path for pattern in build_docs.WRITTEN for path in sorted(ROOT.glob(pattern))]
 MOST_WORDS = 30_000
-"""Number of words that docs/ may hold: people write them, and people have to keep them true."""
+"""Number of words that docs/ may hold but for the generated page: people write them, and have to keep them true."""
 
 
 def slugs(path):
@@ -42,7 +42,8 @@ def test_each_word_of_the_glossary_is_linked_where_it_is_used():
 
 
 def test_people_keep_what_they_can_read():
-    assert sum(len(path.read_text().split()) for path in (ROOT / "docs").rglob("*.md")) <= MOST_WORDS
+    written = [path for path in (ROOT / "docs").rglob("*.md") if path != tables.RESULTS]
+    assert sum(len(path.read_text().split()) for path in written) <= MOST_WORDS
 
 
 @pytest.mark.each_change  # all tasks are loaded: 19 s

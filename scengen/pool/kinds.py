@@ -60,5 +60,7 @@ def check_there(folder: Path, mark: str, maker: str) -> None:
         why = f"{mark} is missing; a run was started there; repeat its command to finish it"
     else:
         why = f"{mark} is missing; see scengen {maker}"
-    alike = nearest(folder.name, (path.name for path in folder.parent.glob("*/") if path != folder and marks(path)))
+    there = [path for path in folder.parent.glob("*/") if path != folder and marks(path)]
+    close = [path for path in there if nearest(folder.name, [path.name])]
+    alike = f" (did you mean {str(close[0])!r}?)" if close else ""
     raise PoolError(f"no {MARKS[mark].removeprefix('a ')} at {folder}{alike}: {why}")
