@@ -51,7 +51,7 @@ class ProgressBar:
         self.show(done, note)
 
     def show(self, done: int, note: str = "") -> None:
-        """Show that `done` of the total are done. Several workers may do more than was asked for."""
+        """Show that `done` of the total are done. Several workers may do more than needed."""
         now, done = time.monotonic(), done if self.total is None else min(done, self.total)
         if self._first is None or done < self._first[1]:  # other work has started
             self._first = now, done

@@ -189,6 +189,7 @@ def test_options_that_do_not_exist_are_one_line(capsys, asked, says):
 def test_every_help_has_an_example_that_can_be_composed(verb):
     text = usage(verb, [DOMINO])
     (example,) = re.findall(r"^# Example: (scengen .*)$", text, re.M)
+    text = re.sub(r"\s*\n# {2,}", " ", text)  # lines are as wide as the terminal
     program, *words = shlex.split(example)
     given, overrides = parsed(words)
     assert (program, given) == ("scengen", verb)
