@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from itertools import islice, zip_longest
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..attack.campaign import AttackReport
@@ -20,10 +21,20 @@ from ..samplers.axis import Axis, spell
 from ..samplers.dists import Fixed
 from ..samplers.task import ID, Task
 from ..samplers.task_files import About
+from ..work.printed import width
 from .certificates import certificate_table
 
 LINES = 1000
 """Largest number of scenarios in a table of a pool; id= finds the others."""
+
+
+def plain_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """A table without lines between columns, so that it fits 80 columns. Its title stays in one line where it can."""
+    least = min(len(title), width() or len(title))
+    table = Table(*head, title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False, min_width=least)
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 def funnel_table(funnel: Mapping[str, int], reasons: Mapping[str, int]) -> Table:

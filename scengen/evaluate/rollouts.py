@@ -219,7 +219,7 @@ class Run(LineLog):
         ordered = sorted(some, key=lambda which: (which.arm != CLEAN, bool(which.condition), which.condition))
         counts = ", ".join(f"{n} {name}" for name, n in Counter(map(_named, ordered)).items())
         scenarios, earlier = len({which.scenario for which in some}), len(some & {*map(id_of, self.log.records)})
-        told = f"episodes: {counts} (n = {scenarios} x {self.settings.rollouts})"
+        told = f"episodes: {counts} (scenarios: {scenarios}, rollouts of each: {self.settings.rollouts})"
         automatic = self.settings.chosen_arms is None and any(which.arm != CLEAN for which in some)
         remarks = {
             f"{earlier} from an earlier run": bool(earlier),

@@ -84,11 +84,15 @@ def test_the_plan_and_the_progress_name_every_condition(lines, tmp_path):
     settings = EvaluateSettings(policy="eyes:Often", perturb="noise@1", **given)
     evaluate(settings, lambda *now: shown.append(now) if told else None, announce=told.append)
     (plan,) = told
-    assert plan.startswith("episodes: 1 clean, 1 noise@1, 1 arm blind (n = 1 x 1); arms=none leaves out")
+    assert plan.startswith(
+        "episodes: 1 clean, 1 noise@1, 1 arm blind (scenarios: 1, rollouts of each: 1); arms=none leaves out"
+    )
     assert {total for _, total, _ in shown} == {3} and shown[-1] == (3, 3, "arm blind")
     assert {name for *_, name in shown} == {"clean", "noise@1", "arm blind"}
     evaluate(EvaluateSettings(policy="eyes:Often", arms="none", **given), lambda *_: None, announce=told.append)
-    assert told[1].startswith("episodes: 1 clean (n = 1 x 1); 1 from an earlier run; pictures are slow")
+    assert told[1].startswith(
+        "episodes: 1 clean (scenarios: 1, rollouts of each: 1); 1 from an earlier run; pictures are slow"
+    )
 
 
 @pytest.mark.parametrize("slots", [1, 2])

@@ -3,9 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
-
 from ...compose import load_task
 from ...demos.rollouts import Keeper
 from ...evaluate.arms import BENIGN
@@ -20,6 +17,7 @@ from ...evaluate.settings import PROFILE, EvaluateSettings, other_version
 from ...pool import Pool
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
+from ..tables import plain_table
 from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write
 from .settings import read
 
@@ -114,7 +112,7 @@ def _show(compared: Comparison, settings: EvaluateSettings) -> None:
         n = f", n = {shown.common['n']}" if "n" in shown.common else ""
         by = "split and condition" if "condition" in shown.head else "split"
         title = f"{', '.join(['success [%]', *common])} by {by}, {settings.rules} rules{n}"
-        table = _table(title, *_grouped(shown))
+        table = plain_table(title, *_grouped(shown))
         for column in table.columns[1:]:
             column.no_wrap, column.justify = True, "right"
         if explained:
@@ -129,7 +127,7 @@ def _show(compared: Comparison, settings: EvaluateSettings) -> None:
     ):
         if rows:
             say("")
-            out.print(_table(title, head, rows[:MAX_SHOWN]))
+            out.print(plain_table(title, head, rows[:MAX_SHOWN]))
         if (more := len(rows) - MAX_SHOWN) > 0:
             say(f"{more} more lines are in table.md")
     for line in compared.headlines:
@@ -150,14 +148,6 @@ def _grouped(shown: ShownTable) -> tuple[list[str], list[list[str]]]:
         found.append([where if policy is None else f"  {row[policy]}", *(row[k] for k in others)])
         before = where
     return ["", *(shown.head[k] for k in others)], found
-
-
-def _table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """A table without lines between columns, so that it fits 80 columns."""
-    table = Table(*head, title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
-    for row in rows:
-        table.add_row(*row)
-    return table
 
 
 def _report(result: PolicyResult) -> bool:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...compose import chosen_task
@@ -22,6 +21,7 @@ from ...pool import Pool
 from ...pool.collection import write_index
 from ...runs.progress import ProgressBar
 from ...samplers.task_files import search_path
+from ..tables import plain_table
 from . import FAILED, OK, Arguments, err, names, out, remark, say, warn, write
 from .settings import read, task_overrides
 
@@ -107,10 +107,7 @@ def _table(results: Sequence[ThresholdResult]) -> Table:
     """Success at each level."""
     shift, cells = results[0].shift, list(rows(results))
     title = f"{shift.task.name} along {shift.name}: success [%] with 95 % intervals, {results[0].settings.rules} rules"
-    table = Table(*cells[0], title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
-    for row in cells:
-        table.add_row(*row.values())
-    return table
+    return plain_table(title, list(cells[0]), [list(row.values()) for row in cells])
 
 
 def _report(result: ThresholdResult, pools: LevelPools) -> bool:
