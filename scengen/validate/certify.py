@@ -366,7 +366,7 @@ class Trial:
         return World.load(self.text, self.embodiment, substeps=substeps)
 
     def _run(self, planner: Planner) -> Rollout:
-        return run(self.scenario, self.world, planner, self.horizon, self.settings.settle)
+        return run(self.scenario, self.world, planner, self.horizon, self.settings.settle, whole=True)
 
 
 Finding = tuple[Mapping[str, Any], Mapping[str, Any], str]

@@ -146,6 +146,7 @@ def run(
     raw: bool = False,
     rules: Rules = STRICT,
     until_decided: bool = False,
+    whole: bool = False,
 ) -> Rollout:
     """Play a plan from the start of `world` until success, failure or the horizon.
 
@@ -160,10 +161,14 @@ def run(
         rules: rules that end the episode.
         until_decided: whether the episode may end once a mean was missed, if the rules require all means: no goal
             counts from then on.
+        whole: whether nothing was taken out of the scene, so that it has every body that its means name.
+
+    Raises:
+        UnknownName: the goal was reached without a mean that names a body that a whole scene does not have.
     """
     world.reset()
     episode = Episode(scenario, world, horizon, rules)
-    return _play(episode, _Planned(world, planner, jitter, raw), settle, until_settled, until_decided)
+    return _play(episode, _Planned(world, planner, jitter, raw), settle, until_settled, until_decided, whole)
 
 
 def go_on(episode: Episode, planner: Planner, settle: float = 1.0) -> Rollout:
@@ -298,6 +303,7 @@ def _play(
     settle: float,
     until_settled: bool,
     until_decided: bool = False,
+    whole: bool = False,
 ) -> Rollout:
     actions: list[NDArray[np.float32]] = []
     world, decided = episode.world, until_decided and episode.rules == STRICT
@@ -308,8 +314,8 @@ def _play(
         return episode.step(actions[-1])
 
     def ended(outcome: Outcome, reason: str, at: float) -> Rollout:
-        if episode.lacks and episode.means.unknown and isinstance(source, _Planned):
-            raise episode.means.unknown  # a witness is also played in scenes without the things that help
+        if whole and episode.lacks and episode.means.unknown:
+            raise episode.means.unknown
         played = np.array(actions, np.float32).reshape(-1, world.size)
         about = (source.note, episode.lacks, world.loop.converged, source.filtered)
         return Rollout(outcome, reason, round(at, 6), played, world.digest, *about)

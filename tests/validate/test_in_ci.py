@@ -75,7 +75,8 @@ def test_json_is_written_for_a_missing_pool_too(tmp_path):
 
 def test_a_missing_pool_is_told_with_the_nearest_folder_beside_it(of_another_mujoco, capsys):
     assert cli.run(["verify", f"pool={of_another_mujoco}d"]) == 2
-    assert "oldd (did you mean 'old'?): manifest.json is missing" in capsys.readouterr().err
+    told = f"oldd (did you mean {str(of_another_mujoco)!r}?): manifest.json is missing"
+    assert told in capsys.readouterr().err
 
 
 @pytest.fixture

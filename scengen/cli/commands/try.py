@@ -214,7 +214,7 @@ def _played(stage: Stage, settings: TrySettings) -> tuple[Rollout, Take, str]:
         return rollout, taken, _end(rollout, disturbed, plan.end)
     if settings.what == ORACLE:
         plan = Watched(scenario.oracle)
-        rollout = run(scenario, world, plan, stage.horizon, settle)
+        rollout = run(scenario, world, plan, stage.horizon, settle, whole=True)
     elif settings.what in shortcuts:
         plan = Watched(shortcuts[settings.what].plan)
         watched = replace(shortcuts[settings.what], plan=plan)
