@@ -491,6 +491,8 @@ def _remedy(verb: str, text: str) -> str:
         if split:
             return f"; a shell splits it at spaces: put all of it in single quotes, '{key}=...'"
         return '; put double quotes around texts within it, as in {why: "a; b"}'
+    if key.startswith(("task.id.", "task.axes.")) and (call := re.fullmatch(r"(\w+)\((.*)\)", value)):
+        return f"; give '{key}=[{call[1]},{call[2]}]'"
     fixed = f'{key}="{value}"'
     if given and len(text) < SHOWN_LENGTH and re.fullmatch(r"[\w.+]+", key) and _parsed(fixed):
         return f"; quote the value twice: {shlex.quote(fixed)}"

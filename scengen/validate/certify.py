@@ -12,7 +12,7 @@ from .. import html_tables
 from ..certificate import CHECKS, NOT_CHECKED, Certificate, Check
 from ..control.loop import Loop
 from ..episode import PAPER, Actions, Episode
-from ..errors import BadConfig, ScengenError, where_written
+from ..errors import BadConfig, ScengenError, UnknownName, where_written
 from ..geometry import Mat3, Vec3
 from ..scenario import Plan, Planner, Scenario
 from ..sim import scene_text
@@ -328,14 +328,12 @@ class Trial:
             text, _ = scene_text.emit(scene)
             if self.scenario.conditions:
                 text = impaired(text, self.world.loop.impairment, self.embodiment)
-            episode = replay(
-                self.scenario,
-                World.load(text, self.embodiment),
-                self.solution.actions,
-                self.horizon,
-                self.settings.settle,
-                until_settled=True,
-            )
+            world, settle = World.load(text, self.embodiment), self.settings.settle
+            try:
+                episode = replay(self.scenario, world, self.solution.actions, self.horizon, settle, until_settled=True)
+            except UnknownName as error:
+                error.args = (f"{error} (in the ablation {name}, where it may be missing)",)
+                raise
             numbers[name] = _outcome(episode)
             if episode.solved:
                 return {}, numbers, f"the witness succeeds with {name!r}"

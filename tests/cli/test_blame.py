@@ -35,6 +35,8 @@ ABLATED = (
     "ablations = lambda self: {'gone': __import__('scengen.assets.prop', fromlist=['remove'])"
     ".remove(super(Mine, self).build(), 'slap')}"
 )
+NEEDED = "failure = lambda self, world: str(world.pos('tile_1')) * 0 or None"
+"""An ablation takes the second tile out."""
 
 
 @pytest.fixture
@@ -75,6 +77,7 @@ def test_an_error_of_a_family_names_its_file_and_line(written, capsys, module, c
     [
         ("twice", TWICE, "repeated name 'slab' in body; give each its own name"),
         ("ablated", ABLATED, "no body named 'slap' (did you mean 'slab'?); known: "),
+        ("needed", NEEDED, "(in the ablation no_chain, where it may be missing)"),
     ],
 )
 def test_a_wrong_name_in_a_scene_ends_the_first_draw(written, tmp_path, capsys, module, code, told):

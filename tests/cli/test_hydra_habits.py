@@ -134,6 +134,7 @@ def test_other_commands_say_that_they_take_one_value(capsys):
         (("generate", DOMINO, "split=id,diagonal", "hydra.mode=MULTIRUN"), "scengen: 'hydra.mode=MULTIRUN': leave it"),
         (("generate", DOMINO, "certify=mine"), "hydra.searchpath=FOLDER adds the folder that holds your certify/NAME"),
         (("generate", DOMINO, "certify=full", "certify.robust.bound=0.4"), "level full have 0.8 or more"),
+        (("generate", DOMINO, "task.id.x=uniform(0.1,0.2)"), "; give 'task.id.x=[uniform,0.1,0.2]'"),
         (("generate", DOMINO, "+task.axes.x={why: a, replace: {}"), "a bracket is not closed: } is missing"),
         (("generate", DOMINO, "--cfg", "job", "-p", "certify"), "--cfg shows the whole configuration; leave -p out"),
     ],

@@ -84,9 +84,10 @@ class Run:
             if any(words in reason for reason in summary.reasons):
                 say(f"remedy for {words!r}: {remedy}")
         if summary.certified < settings.n:
+            more = ", or raise limit=" if summary.certified else ""
             warn(
                 f"scengen: only {summary.certified} of {settings.n} could be certified among {summary.indices} "
-                "indices; see the reasons above, play one with scengen try, or raise limit="
+                f"indices; see the reasons above, and play one with scengen try{more}"
             )
         return summary
 
