@@ -82,8 +82,13 @@ class Certificate:
     """Checks in the order in which they ran."""
 
     def __repr__(self) -> str:
-        passed = sum(bool(check.passed) for check in self.checks)
-        return f"Certificate({self.verdict}, level {self.settings}, {passed} of {len(self.checks)} checks passed)"
+        return f"Certificate({self.summary})"
+
+    @property
+    def summary(self) -> str:
+        """Verdict, and how many of the checks that were made passed."""
+        made = [check.passed for check in self.checks if check.passed is not None]
+        return f"{self.verdict}: {sum(made)} of {len(made)} checks passed"
 
     def __getitem__(self, name: str) -> Check:
         """The check of that name."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .control.loop import Loop
-from .errors import UnknownName, Unstable
+from .errors import BadConfig, UnknownName, Unstable, where_written
 from .means import Watch
 from .scenario import Scenario
 from .sim.world import World
@@ -92,6 +92,9 @@ class Episode:
         if self.outcome is None:
             self.means.update()
         if self.outcome in (None, "success") and (lost := self.scenario.failure(self.world)):
+            if not isinstance(lost, str):
+                where = where_written(type(self.scenario).failure)
+                raise BadConfig(f"{where}: it returned {lost!r}; return the reason as text, or None")
             self.reason = f"after the goal was reached: {lost}" if self.outcome else lost
             self.outcome = "failure"
         elif self.outcome is None:

@@ -55,6 +55,7 @@ def test_objects_are_one_short_line(draw):
         (row, "PoolRow(domino_single/id@0/8ed4a4577fe0)"),
         (task, f"Task(domino_single version {task.version}: {len(task.axes)} axes)"),
         (draw, f"Draw(domino_single/wide_gaps@7/{draw.scenario.id}: gap_ratio = 1.342)"),
+        (certified.certificate, "Certificate(unknown: 1 of 1 checks passed)"),
         (certified, "Certified(unknown: 1 of 1 checks passed, witness of 3 actions)"),
         (Rollout("failure", "why", 1.5, ACTIONS, ""), "Rollout(failure: why, 1.50 s, 3 actions)"),
         (scengen.World.load(row.scene_xml), "World(30 bodies, 1 arm, time 0.00 s)"),

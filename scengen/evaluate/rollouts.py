@@ -134,6 +134,8 @@ def opened(
         why = f"{path} holds episodes of an earlier run, and a server does not say which weights it serves"
         raise BadConfig(f"{why}; pass fresh=true to start again, or version=NAME from the start to be able to continue")
     remedy = "pass fresh=true to start again (old episodes are moved aside), or choose another to="
+    if settings.name.startswith("__main__:"):
+        remedy = f"a policy that was typed into a session can be compared by its attribute `version` only; {remedy}"
     with closing(PolicyPlayer(settings, search)) as player:
         task_versions = {a["task"]: a["task_version"] for a in about.values()}
         described = player.described({*task_versions})

@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from ..control.loop import Loop
 from ..episode import STRICT, Actions, Episode, Rules
-from ..errors import UnknownName
+from ..errors import BadConfig, UnknownName
 from ..look.looks import ROOM, Look
 from ..means import MISSED, OPEN, SHOWN
 from ..perturb.drawn import Drawn
@@ -312,7 +312,10 @@ def inline(
     Raises:
         NoPictures: OpenGL is missing.
         UnknownName: there is no such camera.
+        BadConfig: it is not a take.
     """
+    if not isinstance(take, Take):
+        raise BadConfig(f"a {type(take).__name__} is not a take; give film.Take.witness(row, scenario), or another take")
     camera = take.camera(camera, width, height)
     with closing(Camera(take.world(), width, height)) as eye:
         first, *others = map(Image.fromarray, _frames(take, eye, fps, camera, progress))

@@ -35,9 +35,7 @@ class Certified:
     """Hash of the physics state at the end of the witness."""
 
     def __repr__(self) -> str:
-        made = [check.passed for check in self.certificate.checks if check.passed is not None]
-        checks = f"{sum(made)} of {len(made)} checks passed"
-        return f"Certified({self.certificate.verdict}: {checks}, witness of {len(self.witness)} actions)"
+        return f"Certified({self.certificate.summary}, witness of {len(self.witness)} actions)"
 
     def _repr_html_(self) -> str:
         """Its checks, in a notebook."""
@@ -186,6 +184,8 @@ class Trial:
             return {b: (world.com(b), world.rot(b)) for b in bodies}, self.scenario.success(world)
 
         start, self.solved_at_start = state()
+        if self.solved_at_start is None:
+            raise BadConfig(f"{where_written(type(self.scenario).success)}: it returned None; return True or False")
         end, self.solved_after_rest = start, self.solved_at_start
         episode, waiting = Episode(self.scenario, world, self.horizon, PAPER), self.scenario.pending(world)
         self.rested = episode

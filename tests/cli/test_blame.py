@@ -77,6 +77,8 @@ def test_an_error_of_a_family_names_its_file_and_line(written, capsys, module, c
     [
         ("twice", TWICE, "repeated name 'slab' in body; give each its own name"),
         ("ablated", ABLATED, "no body named 'slap' (did you mean 'slab'?); known: "),
+        ("nothing_returned", "success = lambda self, world: None", "it returned None; return True or False"),
+        ("flag", "failure = lambda self, world: world.time > 0.5", "it returned True; return the reason as text, or"),
         ("needed", NEEDED, "(in the ablation no_chain, where it may be missing)"),
     ],
 )
