@@ -375,10 +375,11 @@ def _check_hydra(experiment: str, node: DictConfig, plain: DictConfig) -> None:
     Raises:
         BadConfig: one line with the remedy.
     """
+    chosen, usual = (OmegaConf.to_container(each.hydra) for each in (node, plain))
     for key in ("mode", "run", "sweep", "launcher", "sweeper", "verbose", "env", "callbacks"):
-        if OmegaConf.to_container(node.hydra)[key] != OmegaConf.to_container(plain.hydra)[key]:  # type: ignore[index]
-            told = f"{EXPERIMENT}/{experiment}.yaml: leave hydra.{key} out"
-            raise BadConfig(f"{told}; {_instead_of(f'hydra.{key}')}scengen accepts no setting of Hydra in a file")
+        if chosen[key] != usual[key]:  # type: ignore[index]
+            remedy = f"leave hydra.{key} out; {_instead_of(f'hydra.{key}')}"
+            raise BadConfig(f"{EXPERIMENT}/{experiment}.yaml: {remedy}scengen accepts no setting of Hydra in a file")
 
 
 def _check_override(verb: str, text: str) -> None:

@@ -31,11 +31,16 @@ class Mean:
     after: str = ""
     """Name of another mean that must have been shown before this one is judged; empty if there is none."""
 
-    def found(self, world: World) -> float:
-        """What is found out about an open mean now. In a scene without a body that it is about, it is missed."""
+    def found(self, world: World, note: Callable[[UnknownName], object] = lambda error: None) -> float:
+        """What is found out about an open mean now. In a scene without a body that it is about, it is missed.
+
+        Args:
+            note: called with the error that says which body that is.
+        """
         try:
             return self.judge(world)
-        except UnknownName:
+        except UnknownName as error:
+            note(error)
             return MISSED
 
 
@@ -77,8 +82,8 @@ class Watch:
         if len(means) > MAX_MEANS:
             raise ValueError(f"a task has at most {MAX_MEANS} means, not {len(means)}")
         self.means, self.world = means, world
-        self.unknown: UnknownName | None = None
-        """The first name that a mean asked for and the scene does not have."""
+        self.unknown: list[UnknownName] = []
+        """Errors about bodies that means name and the scene does not have."""
         self._numbers = {name: number for number, name in enumerate(means)}
         self._order = [(number, mean, self._numbers.get(mean.after)) for number, mean in enumerate(means.values())]
 
@@ -87,10 +92,7 @@ class Watch:
         world, shown = self.world, self.world.shown
         for number, mean, before in self._order:
             if shown.item(number) == OPEN and (before is None or shown.item(before) == SHOWN):
-                try:
-                    shown[number] = mean.judge(world)
-                except UnknownName as error:
-                    shown[number], self.unknown = MISSED, self.unknown or error
+                shown[number] = mean.found(world, self.unknown.append)
 
     def found(self) -> dict[str, float]:
         """What is found out about each mean so far: `OPEN`, `SHOWN` or `MISSED`."""

@@ -21,6 +21,7 @@ from ..pool import Pool, kinds
 from ..pool.files import sha256
 from ..samplers.split import ID
 from ..work.fingerprint import fingerprint
+from ..work.foreign import factory_of, is_typed
 from ..work.log import Log
 from ..work.machine import cores
 from ..work.parallel import each
@@ -134,7 +135,7 @@ def opened(
         why = f"{path} holds episodes of an earlier run, and a server does not say which weights it serves"
         raise BadConfig(f"{why}; pass fresh=true to start again, or version=NAME from the start to be able to continue")
     remedy = "pass fresh=true to start again (old episodes are moved aside), or choose another to="
-    if settings.name.startswith("__main__:"):
+    if settings.name.startswith("__main__:") and is_typed(factory_of("policy", settings.name)):
         remedy = f"a policy that was typed into a session can be compared by its attribute `version` only; {remedy}"
     with closing(PolicyPlayer(settings, search)) as player:
         task_versions = {a["task"]: a["task_version"] for a in about.values()}

@@ -315,7 +315,9 @@ def inline(
         BadConfig: it is not a take.
     """
     if not isinstance(take, Take):
-        raise BadConfig(f"a {type(take).__name__} is not a take; give film.Take.witness(row, scenario), or another take")
+        raise BadConfig(
+            f"a {type(take).__name__} is not a take; give film.Take.witness(row, scenario), or another take"
+        )
     camera = take.camera(camera, width, height)
     with closing(Camera(take.world(), width, height)) as eye:
         first, *others = map(Image.fromarray, _frames(take, eye, fps, camera, progress))

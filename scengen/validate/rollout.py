@@ -315,7 +315,7 @@ def _play(
 
     def ended(outcome: Outcome, reason: str, at: float) -> Rollout:
         if whole and episode.lacks and episode.means.unknown:
-            raise episode.means.unknown
+            raise episode.means.unknown[0]
         played = np.array(actions, np.float32).reshape(-1, world.size)
         about = (source.note, episode.lacks, world.loop.converged, source.filtered)
         return Rollout(outcome, reason, round(at, 6), played, world.digest, *about)

@@ -168,12 +168,12 @@ def _valid_runs(requested: Sequence[Combination]) -> tuple[list[Combination], li
     Raises:
         ScengenError: a combination is not valid; the message names it.
     """
-    told = "no pool was made"
-    runs = {str(one): run for one, run in zip(requested, each_checked(requested, _run, told), strict=True)}
-    missing = each_checked(requested, lambda one: _missing(runs[str(one)]), told)
+    nothing = "no pool was made"
+    runs = {str(one): run for one, run in zip(requested, each_checked(requested, _run, nothing), strict=True)}
+    missing = each_checked(requested, lambda one: _missing(runs[str(one)]), nothing)
     foreign = [any(each <= run.task.axes.keys() for run in runs.values()) if each else False for each in missing]
     kept = [one for one, elsewhere in zip(requested, foreign, strict=True) if not elsewhere]
-    each_checked(kept, lambda one: runs[str(one)].settings.check(runs[str(one)].task), told)
+    each_checked(kept, lambda one: runs[str(one)].settings.check(runs[str(one)].task), nothing)
     if len(kept) < len(requested):
         lacking = ", ".join(str(one) for one in requested if one not in kept)
         warn(f"scengen: left out, because the task has no such split: {lacking}", "yellow")
