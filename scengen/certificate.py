@@ -110,7 +110,7 @@ class Certificate:
         return f"{self.failed.name}: {self.failed.reason}" if self.failed else ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StoredCertificate:
     """A certificate as a pool holds it: its checks, the scene and witness that they concern, and the code used."""
 
@@ -136,6 +136,9 @@ class StoredCertificate:
     """Hash of the code of the family when the certificate was made. It decides nothing."""
     versions: Mapping[str, str]
     """Versions of every package that the physics depends on, and the platform."""
+
+    def __repr__(self) -> str:
+        return f"StoredCertificate({Certificate(self.settings, self.checks).summary})"
 
     @property
     def complete(self) -> bool:

@@ -90,8 +90,7 @@ def _loaded(name: str, overrides: Sequence[str]) -> Task:
 
 def certify_levels(task: Task) -> dict[str, CertifySettings]:
     """Settings of the certificates of a task at each level of conf/certify, such as `quick`, by name of the level."""
-    names = sorted(path.stem for path in (conf_dir() / "certify").glob("*.yaml"))
-    return {name: typed("certify", CertifySettings, certify_node({}, task, name)) for name in names}
+    return {name: typed("certify", CertifySettings, certify_node({}, task, name)) for name in _names("certify")}
 
 
 def certify_node(
@@ -506,8 +505,11 @@ def _remedy(verb: str, text: str) -> str:
 
 def _files_of(group: str) -> str:
     """Command that lists the files of a group, or their names."""
-    names = sorted(path.stem for path in (conf_dir() / group).glob("*.yaml"))
-    return "see scengen tasks" if group == "task" else f"known: {', '.join(names)}"
+    return "see scengen tasks" if group == "task" else f"known: {', '.join(_names(group))}"
+
+
+def _names(group: str) -> list[str]:
+    return sorted(path.stem for path in (conf_dir() / group).glob("*.yaml"))
 
 
 def _parsed(text: str, parser: OverridesParser | None = None) -> Override | None:
@@ -626,6 +628,10 @@ def _explained(verb: str, overrides: Sequence[str], error: Exception) -> BadConf
     if match := re.search(r"Could not find '(\w+)/([^']*)'", text):
         group, name = match.groups()
         return UnknownName(group, name, re.findall(r"^\s+(\S+)$", text, re.M))
+    if match := re.search(r"In '([^']+)': Could not load '(\w+)/([^']*)'", text):
+        file, group, name = match.groups()
+        known = tasks(search_path(overrides)) if group == "task" else _names(group)
+        return BadConfig(f"{cut(file)}.yaml, defaults: {UnknownName(group, name, known)}")
     if (match := re.match(r"force-add of config groups is not supported: '\+\+(.*)'", text)) or (
         match := next(filter(None, (re.match(f"({EXPERIMENT}=.*)", each) for each in overrides)), None)
     ):

@@ -235,8 +235,16 @@ def make_policy(name: str, factory: Factory, env: PoolEnv) -> Policy:
 
     Raises:
         ForeignCode: the factory raises an error.
-        BadConfig: the returned object is not a policy.
+        BadConfig: the factory does not accept an environment, or the returned object is not a policy.
     """
+    try:
+        inspect.signature(factory).bind(env)
+    except TypeError:
+        what = "its factory is called with the environment, and does not accept it"
+        remedy = "write `def make_policy(env)`, or `def __init__(self, env)`"
+        raise BadConfig(f"policy = {cut(name)}; {what}; {remedy}") from None
+    except ValueError:  # written in C, without a signature
+        pass
     with policy_errors(name, "its factory", env):
         policy = factory(env)
     if missing := [method for method in ("reset", "act") if not callable(getattr(policy, method, None))]:

@@ -45,9 +45,9 @@ class Take:
     """Recorded actions in their scene, to be filmed."""
 
     scenario: Scenario
-    scene_xml: str
+    scene_xml: str = field(repr=False)
     embodiment: str
-    actions: Actions
+    actions: Actions = field(repr=False)
     rules: Rules = field(default=STRICT, kw_only=True)
     look: Look = field(default=ROOM, kw_only=True)
     directions: Directions = field(default=VIEWS, kw_only=True)

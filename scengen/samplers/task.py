@@ -204,7 +204,10 @@ class Task:
         """
         part = Part.parse(part) if isinstance(part, str) else part
         if part.axis not in self.axes:
-            raise UnknownName(f"split of {self.name}", part.axis, [ID, *self.axes, *conditions.KINDS])
+            unknown = UnknownName(f"split of {self.name}", part.axis, [ID, *self.axes, *conditions.KINDS])
+            if "," in part.axis:
+                raise BadConfig(f"{unknown}; give several on the command line: split={cut(part.axis)}")
+            raise unknown
         axis = self.axes[part.axis]
         if part.severity is None:
             return axis

@@ -54,6 +54,7 @@ def experiments(tmp_path):
     (tmp_path / "experiment" / "bare.yaml").write_text("n: 3\n")
     sweeping = "# @package _global_\nn: 3\nhydra: {sweeper: {params: {split: 'id,diagonal'}}}\n"
     (tmp_path / "experiment" / "sweeping.yaml").write_text(sweeping)
+    (tmp_path / "experiment" / "several.yaml").write_text("# @package _global_\nsplit: id,low_starter\n")
     (tmp_path / "experiment" / "few.yaml").write_text("# @package _global_\nn: 3\n")
     return f"hydra.searchpath={tmp_path}"
 
@@ -86,6 +87,7 @@ def test_experiments_are_swept_shown_and_taken_by_commands_without_groups(experi
         ("+experiment=bare", "experiment/bare.yaml: start it with `# @package _global_`"),
         ("experiment=heavy", "give +experiment=heavy, with one plus"),
         ("++experiment=heavy", "give +experiment=heavy, with one plus"),
+        ("+experiment=several", "give several on the command line: split=id,low_starter"),
         ("+experiment=sweeping", "experiment/sweeping.yaml: leave hydra.sweeper out; several values make a sweep"),
     ],
 )
@@ -93,6 +95,14 @@ def test_an_experiment_that_cannot_be_taken_has_a_remedy(word, told, experiments
     assert cli.run(["generate", DOMINO, word, experiments]) == 2
     shown = capsys.readouterr().err
     assert told in shown and shown.count("\n") == 1
+
+
+def test_a_misspelt_base_of_a_task_file_is_named_with_the_file(tmp_path, capsys):
+    (tmp_path / "task").mkdir()
+    (tmp_path / "task" / "mine.yaml").write_text("defaults: [domino_singel, _self_]\n")
+    assert cli.run(["generate", "task=mine", f"hydra.searchpath={tmp_path}"]) == 2
+    told = "task/mine.yaml, defaults: no task named 'domino_singel' (did you mean 'domino_single'?)"
+    assert told in capsys.readouterr().err
 
 
 def test_an_experiment_without_a_folder_says_where_to_put_it(capsys):

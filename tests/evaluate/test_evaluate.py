@@ -249,6 +249,8 @@ def test_a_policy_that_tells_its_version_is_bound_to_it_and_not_to_its_source(mi
         ("raise RuntimeError('no GPU')\n", "its module cannot be imported (RuntimeError: no GPU, "),
         ("import nowhere_at_all\nUp = 1\n", "its module cannot be imported (ModuleNotFoundError"),
         ("def Up(env): return None\n", "its factory returned NoneType, which has no method reset and no act"),
+        ("def Up(): return 1\n", "does not accept it; write `def make_policy(env)`"),
+        ("class Up: pass\n", "or `def __init__(self, env)`"),
         ("def Up(env): return 1 / 0\n", "its factory fails (ZeroDivisionError"),
         (MINE.replace("return [0] * 7", "raise ValueError('odd')"), "its act on scenario"),
         (MINE.replace("[0] * 7", "'up'"), "its act on scenario"),

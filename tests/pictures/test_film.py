@@ -89,6 +89,7 @@ def test_captions_tell_time_and_the_moment_of_success(row, scenario):
     take = film.Take.witness(row, scenario)
     told = list(take.moments(take.world(), take.even(3)))
     (witness,) = [check for check in row.certificate.checks if check.name == "witness"]
+    assert len(repr(take)) < 1500, "neither the scene nor the actions"
     assert told[0] == "0.00 s" and told[-1] == f"{take.seconds:.2f} s, success at {witness.numbers['seconds']:.2f} s"
 
 

@@ -61,6 +61,7 @@ def test_a_pool_holds_the_first_certified_indices_in_order(made):
     rows = list(Pool.open(made).rows())
     assert [r.index for r in rows] == [0, 1, 2]
     assert all(r.certificate.complete and r.split == "id" and r.axes == () and r.shifted == {} for r in rows)
+    assert all(repr(r.certificate).startswith("StoredCertificate(certified: ") for r in rows)
     assert all(r.witness.dtype == np.float32 and r.witness.shape[1] == 7 for r in rows)
 
 
