@@ -25,3 +25,12 @@ def test_values_and_severities_do():
         "axes.low_starter.replace.starter.height"
     ]
     assert differing(severities=5) == ["axes.low_starter.severities"]
+
+
+def test_an_axis_of_the_pool_alone_is_shown_without_reason_and_source():
+    node = deepcopy(dict(TASK.node))
+    node["axes"]["mine"] = {**node["axes"]["low_starter"], "why": "Mine.", "source": "here"}
+    [found] = task_differences(TASK, load(TASK.name, node))
+    assert (
+        found["key"] == "axes.mine" and "replace" in str(found) and not {"why", "source"} & set(str(found).split("'"))
+    )

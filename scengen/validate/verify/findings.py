@@ -208,7 +208,8 @@ def task_differences(installed: Task, stored: Task) -> list[dict[str, str]]:
 
 def _meaning(node: Mapping[str, Any]) -> dict[str, Any]:
     """A task file without scans, and without the reasons and sources of axes, on which no scenario depends."""
-    axes = {name: {**axis, "why": "", "source": ""} for name, axis in (node.get("axes") or {}).items()}
+    told = ("why", "source")
+    axes = {name: {k: v for k, v in axis.items() if k not in told} for name, axis in (node.get("axes") or {}).items()}
     return {**{key: value for key, value in node.items() if key != "scans"}, **({"axes": axes} if axes else {})}
 
 
