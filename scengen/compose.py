@@ -149,7 +149,7 @@ def composed(verb: str, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[
                 files = [text for text in prepared if text.startswith(SEARCH_PATH)]
                 files += [f"{group}={choices[group]}" for group in groups(verb) if group in choices]
                 plain = compose(config_name(verb, prepared), overrides=files, return_hydra_config=True)
-                _check_hydra(choices[EXPERIMENT], node, plain)
+                _check_experiment(verb, choices[EXPERIMENT], node, plain, prepared)
             del node["hydra"]
             if EXPERIMENT in node and EXPERIMENT in choices:
                 raise BadConfig(f"{EXPERIMENT}/{choices[EXPERIMENT]}.yaml: start it with `# @package _global_`")
@@ -368,12 +368,19 @@ def _with_packages(overrides: Sequence[str]) -> list[str]:
     return [f"hydra.searchpath=[{','.join([*map(str, folders), *packages()])}]", *others]
 
 
-def _check_hydra(experiment: str, node: DictConfig, plain: DictConfig) -> None:
-    """Refuse an experiment with settings of Hydra, which would have no effect.
+def _check_experiment(verb: str, experiment: str, node: DictConfig, plain: DictConfig, prepared: Sequence[str]) -> None:
+    """Refuse an experiment with settings that the command lacks, or with those of Hydra, which would have no effect.
+
+    Args:
+        plain: the same configuration without the experiment.
 
     Raises:
         BadConfig: one line with the remedy.
     """
+    added = {text.partition("=")[0].lstrip("+") for text in prepared if text.startswith("+")}
+    if odd := [str(key) for key in node if key not in {*plain, *added, EXPERIMENT}]:
+        told = UnknownName(f"setting of {verb}", odd[0], [str(key) for key in plain if key != "hydra"])
+        raise BadConfig(f"{EXPERIMENT}/{experiment}.yaml: {told}")
     chosen, usual = (OmegaConf.to_container(each.hydra) for each in (node, plain))
     for key in ("mode", "run", "sweep", "launcher", "sweeper", "verbose", "env", "callbacks"):
         if chosen[key] != usual[key]:  # type: ignore[index]

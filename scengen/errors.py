@@ -42,12 +42,17 @@ class UnknownName(ScengenError):
         names = sorted({*known})
         close = f" (did you mean {meant!r}?)" if meant else nearest(name, names)
         also = "".join(f", nor {cut(repr(other))}{nearest(other, names)}" for other in others)
-        listed, remedy = ", ".join(names) or "(none)", f"; {REMEDIES[kind]}" if kind in REMEDIES else ""
-        super().__init__(f"no {kind} named {cut(repr(name))}{close}{also}{remedy}; known: {listed}")
+        remedy = f"; {REMEDIES[kind]}" if kind in REMEDIES else ""
+        listed = "" if close and len(names) > MANY else f"; known: {', '.join(names) or '(none)'}"
+        super().__init__(f"no {kind} named {cut(repr(name))}{close}{also}{remedy}{listed}")
+
+
+MANY = 24
+"""Number of known names above which a message that names the nearest one does not list them."""
 
 
 REMEDIES = {
-    "task": "hydra.searchpath=FOLDER adds the folder that holds your task/NAME.yaml",
+    "task": "scengen tasks lists them, hydra.searchpath=FOLDER adds the folder that holds your task/NAME.yaml",
     "split in these pools": "scengen generate split=NAME makes a pool of another split",
     "certify": "hydra.searchpath=FOLDER adds the folder that holds your certify/NAME.yaml",
 }

@@ -55,6 +55,7 @@ def experiments(tmp_path):
     sweeping = "# @package _global_\nn: 3\nhydra: {sweeper: {params: {split: 'id,diagonal'}}}\n"
     (tmp_path / "experiment" / "sweeping.yaml").write_text(sweeping)
     (tmp_path / "experiment" / "several.yaml").write_text("# @package _global_\nsplit: id,low_starter\n")
+    (tmp_path / "experiment" / "misspelt.yaml").write_text("# @package _global_\nsed: 3\n")
     (tmp_path / "experiment" / "few.yaml").write_text("# @package _global_\nn: 3\n")
     return f"hydra.searchpath={tmp_path}"
 
@@ -84,6 +85,7 @@ def test_experiments_are_swept_shown_and_taken_by_commands_without_groups(experi
     ("word", "told"),
     [
         ("+experiment=hevy", "did you mean 'heavy'?"),
+        ("+experiment=misspelt", "experiment/misspelt.yaml: no setting of generate named 'sed' (did you mean 'seed'?)"),
         ("+experiment=bare", "experiment/bare.yaml: start it with `# @package _global_`"),
         ("experiment=heavy", "give +experiment=heavy, with one plus"),
         ("++experiment=heavy", "give +experiment=heavy, with one plus"),
