@@ -116,3 +116,14 @@ def test_task_families_are_flat_and_found_by_their_files_alone():
     """Ids hash the module's path; nothing else imports a family."""
     assert {p.parent for p in (ROOT / "tasks").rglob("*.py")} == {ROOT / "tasks"}
     assert not [n for n in MODULES if room(n) != "tasks" for t in imports(n) if t.startswith("scengen.tasks.")]
+
+
+def test_contributing_draws_every_package_in_its_wing():
+    drawn = (ROOT.parent / "CONTRIBUTING.md").read_text().partition("```\nscengen/\n")[2].partition("```")[0]
+    found, wing = {name: set() for name in WINGS}, ""
+    for line in drawn.splitlines():
+        names = line[:50].split()
+        wing = names[0] if line[2] != " " else wing
+        found[wing] |= {*names}
+    for name, told in WINGS.items():
+        assert {*told.split()} - {"__init__", "__main__"} <= found[name], name
