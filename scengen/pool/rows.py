@@ -116,6 +116,10 @@ class StoredRows(Generic[AnyManifest, AnyRow]):
         """
         return map(self._row, self._reader.rows(self._names(witness)))
 
+    def __iter__(self) -> Iterator[AnyRow]:
+        """All rows in their order, with their witnesses."""
+        return self.rows()
+
     def columns(self, *names: str, places: Iterable[int] | None = None) -> Iterator[tuple[Any, ...]]:
         """A few columns of the rows, with the values of the fields of a row; quicker than `rows`.
 
