@@ -1,18 +1,19 @@
-"""A small policy that sees: behaviour cloning of two cameras and the robot's own pose with PyTorch.
+"""A small policy that sees: two cameras and the robot's own pose to the next two thirds of a second, with PyTorch.
 
     python picture_policy.py collect DEMONSTRATIONS FRAMES [processes] [looks]    # play demonstrations, take pictures
-    python picture_policy.py train FRAMES WEIGHTS.pt [minutes]
+    python picture_policy.py train FRAMES WEIGHTS.pt [steps]
 
-`scengen evaluate policy=picture_policy:make_policy` plays it, see README.md. Rows have 25 Hz. The network (four
-convolutions and a spatial softmax for each camera, a head of two layers) gets the pictures and the pose of now and of
-the row before, and gives the next `CHUNK` actions, of which `PLAYED` are played. With `looks`, each demonstration is
-filmed clean and so many times more, each time under the next perturbation of `MIXTURE`.
+`scengen evaluate policy=picture_policy:make_policy` plays it, see README.md. Rows have 25 Hz. Every `PLAYED` rows the
+policy looks. Its network (four convolutions and a spatial softmax for each camera, a head of two layers) gets the
+pictures, the pose and the time, and gives the actions of the rows until the next look and where the hand is at each
+of them; a hand that is elsewhere is pulled there. With `looks`, each demonstration is filmed clean, and once more under
+one of so many mixtures of perturbations.
 """
 
 import multiprocessing
 import os
 import sys
-import time
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -33,16 +34,21 @@ from scengen.validate.playable import stored_world
 
 CAMERAS = ("rgb_exo_right_cam", "rgb_gripper_cam")
 POSE = ("robot0_eef_pos", "robot0_eef_quat", "robot0_gripper_qpos")
+HAND = 7
+"""Entries of the pose that say where the hand is: position [m] and quaternion."""
 SIZE = 96
 """Edge of the pictures [pixels]."""
-CROP = 88
-"""Edge of the part that the network sees: a random one in training, the middle one in evaluation [pixels]."""
 PERIODS = 4
 """Control periods in a row: 25 Hz."""
-CHUNK = 8
-"""Number of actions that the network predicts."""
-PLAYED = 4
-"""Number of them that are played before it looks again."""
+PLAYED = 16
+"""Rows from one look to the next."""
+LONG = 100.0
+"""Rows that the network's clock counts as 1."""
+PULL = 0.3
+"""Share of the way to where the hand should be that is added to the actions of a row."""
+STEP, TURN = 0.0122, 0.122
+"""How far an action of 1 moves the hand in a row [m] and turns it [rad]: STEP and TURN of `scengen.control.osc`, times
+kp / kd, times 0.04 s."""
 MIXTURE = (
     ("light_direction", "camera_position", "noise"),
     ("light_intensity", "table_texture", "wrist_camera"),
@@ -68,25 +74,21 @@ def collect(demonstrations: str, to: str, processes: str = "1", looks: str = "0"
     print(f"{len(list(Path(to).glob('*.npz')))} films of {count} demonstrations in {to}")
 
 
-def look_of(number: int, look: int, words: Words) -> Perturbation:
-    """The perturbation of a film: none in look 0, then a part of `MIXTURE` without the kinds that the task lacks."""
-    if look == 0:
-        return Perturbation(())
-    turn = number + look
-    level = 1 + turn // len(MIXTURE) % LEVELS
+def look_of(number: int, looks: int, words: Words) -> Perturbation:
+    """The perturbation of a demonstration: a part of `MIXTURE` without the kinds that the task lacks."""
+    turn, level = number % looks, 1 + number // looks % LEVELS
     joined = [name for name in MIXTURE[turn % len(MIXTURE)] if not kinds()[name].lacks(words)]
     return Perturbation(tuple((name, level) for name in joined))
 
 
 def _collect(demonstrations: str, to: str, looks: int, first: int, step: int) -> None:
     for number, row in enumerate(open_source(demonstrations).rows()):
-        for look in range(looks + 1) if number % step == first else ():
-            _film(
-                row,
-                look_of(number, look, Words.of(row.task, row.instruction)),
-                look,
-                Path(to, f"{number:05d}-{look}.npz"),
-            )
+        if number % step != first:
+            continue
+        _film(row, Perturbation(()), number, Path(to, f"{number:05d}-clean.npz"))
+        if looks:
+            look = look_of(number, looks, Words.of(row.task, row.instruction))
+            _film(row, look, number, Path(to, f"{number:05d}-look.npz"))
 
 
 def _film(row: SceneRow, perturbation: Perturbation, seed: int, path: Path) -> None:
@@ -95,10 +97,18 @@ def _film(row: SceneRow, perturbation: Perturbation, seed: int, path: Path) -> N
     senses = perturbation.senses(world.model, row.id, row.task, row.instruction, seed)
     camera, views = Camera(world, SIZE, SIZE), cameras_of(row.embodiment)
     streams = {name: streams_of(row.embodiment)[name] for name in POSE}
+    count = 0
 
     def pictures() -> dict[str, Picture]:
-        taken = {name: scenario.orientation.apply(camera.take(views[name])) for name in CAMERAS}
-        return {name: senses.picture(views[name], world.time, picture) for name, picture in taken.items()}
+        nonlocal count
+        found = {}
+        for name in CAMERAS:
+            shown = senses.arriving(views[name], world.time, copy(world.data))
+            if count % PLAYED == 0:
+                taken = scenario.orientation.apply(camera.take(views[name], shown))
+                found[name] = senses.arrived(views[name], world.time, taken)
+        count += 1
+        return found
 
     def observe() -> Snapshot:
         return Snapshot.of(world, streams, pictures, senses)
@@ -108,18 +118,18 @@ def _film(row: SceneRow, perturbation: Perturbation, seed: int, path: Path) -> N
     if rows[-1].success:
         np.savez(
             path,
-            pictures=np.array([[r.observed.pictures[name] for name in CAMERAS] for r in rows]),
+            pictures=np.array([[r.observed.pictures[name] for name in CAMERAS] for r in rows[::PLAYED]]),
             pose=np.array([np.concatenate([r.observed.streams[name] for name in POSE]) for r in rows]),
             actions=np.array([r.action for r in rows]),
         )
 
 
 class Eye(nn.Module):
-    """Where in a pair of pictures the features of a small convolutional network lie: (n, 6, CROP, CROP) to (n, 128)."""
+    """Where in a picture the features of a small convolutional network lie: (n, 3, SIZE, SIZE) to (n, 128)."""
 
     def __init__(self):
         super().__init__()
-        layers, before = [], 6
+        layers, before = [], 3
         for width, stride in ((32, 2), (64, 2), (64, 1), (64, 1)):
             layers += [nn.Conv2d(before, width, 5 if stride == 2 else 3, stride, 2 if stride == 2 else 1)]
             layers += [nn.GroupNorm(8, width), nn.ReLU()]
@@ -137,120 +147,117 @@ class Eye(nn.Module):
 
 
 class Network(nn.Module):
-    """Pictures of two moments, shape (n, 2, cameras, 3, CROP, CROP) in [0, 1], and poses (n, 2, 9), to actions."""
+    """Pictures, shape (n, cameras, 3, SIZE, SIZE) in [0, 1], and own pose and clock, shape (n, 10), to a plan."""
 
-    def __init__(self, actions: int):
+    def __init__(self, numbers: int):
         super().__init__()
         self.eyes = nn.ModuleList(Eye() for _ in CAMERAS)
         self.head = nn.Sequential(
-            *(nn.Linear(128 * len(CAMERAS) + 2 * len(FLOOR), 512), nn.ReLU(), nn.Linear(512, 512), nn.ReLU()),
-            nn.Linear(512, CHUNK * actions),
+            *(nn.Linear(128 * len(CAMERAS) + len(FLOOR) + 1, 512), nn.ReLU(), nn.Linear(512, 512), nn.ReLU()),
+            nn.Linear(512, PLAYED * numbers),
         )
-        self.actions = actions
+        self.numbers = numbers
 
-    def forward(self, pictures: torch.Tensor, pose: torch.Tensor) -> torch.Tensor:
-        """Actions in [-1, 1], shape (n, CHUNK, actions)."""
-        seen = [eye(pictures[:, :, i].flatten(1, 2)) for i, eye in enumerate(self.eyes)]
-        return self.head(torch.cat([*seen, pose.flatten(1)], 1)).view(-1, CHUNK, self.actions)
+    def forward(self, pictures: torch.Tensor, own: torch.Tensor) -> torch.Tensor:
+        """For each row until the next look the action and the hand's pose, standardized, shape (n, PLAYED, numbers)."""
+        seen = [eye(pictures[:, i]) for i, eye in enumerate(self.eyes)]
+        return self.head(torch.cat([*seen, own], 1)).view(-1, PLAYED, self.numbers)
 
 
-def train(frames: str, weights: str, minutes: str = "5") -> None:
-    """Train for some minutes on nine tenths of the stored demonstrations, and report the error on the others."""
+def train(frames: str, weights: str, steps: str = "2400") -> None:
+    """Train on nine tenths of the stored demonstrations, and report the error on the others."""
     torch.manual_seed(0)
     device = "cuda" if torch.cuda.is_available() else "cpu"
-    pictures, pose, actions, rows, held_out = [], [], [], [], []
-    for path in sorted(Path(frames).glob("*.npz")):
-        found, first, number = np.load(path), sum(map(len, pose)), int(path.stem.partition("-")[0])
-        length = len(found["pose"])
-        pictures.append(torch.from_numpy(found["pictures"]))
-        pose.append(found["pose"])
-        actions.append(found["actions"])
-        for t in range(length):
-            later = [first + min(t + k, length - 1) for k in range(CHUNK)]
-            (held_out if number % 10 == 9 else rows).append([first + max(t - 1, 0), first + t, *later])
-    own, acts = np.concatenate(pose), torch.from_numpy(np.concatenate(actions)).to(device)
-    mean, spread = own.mean(0), np.maximum(own.std(0), FLOOR)
-    own = torch.from_numpy((own - mean) / spread).to(device)
-    seen = torch.cat(pictures).permute(0, 1, 4, 2, 3).contiguous().to(device)
-    del pictures
-    network = Network(acts.shape[1]).to(device)
-    optimizer = torch.optim.AdamW(network.parameters(), 3e-4, weight_decay=1e-3)
-    end, begun, step = time.time() + 60 * float(minutes), time.time(), 0
-    table, tests = torch.tensor(rows, device=device), torch.tensor(held_out, device=device)
+    paths = sorted(Path(frames).glob("*.npz"))
+    found = [dict(np.load(path)) for path in paths]
+    poses, actions = (np.concatenate([film[name] for film in found]) for name in ("pose", "actions"))
+    own_scale = np.stack([poses.mean(0), np.maximum(poses.std(0), FLOOR)])
+    plans = np.concatenate([actions, poses[:, :HAND]], 1)
+    plan_scale = np.stack([plans.mean(0), np.maximum(plans.std(0), 1e-3)])
+    pictures, own, plan, apart = [], [], [], []
+    for path, film in zip(paths, found, strict=True):
+        length = len(film["pose"])
+        ahead = np.concatenate([film["actions"], film["pose"][:, :HAND]], 1)
+        for look, row in enumerate(range(0, length, PLAYED)):
+            pictures.append(film["pictures"][look].transpose(0, 3, 1, 2))
+            own.append([*((film["pose"][row] - own_scale[0]) / own_scale[1]), row / LONG])
+            plan.append((ahead[np.minimum(np.arange(row, row + PLAYED), length - 1)] - plan_scale[0]) / plan_scale[1])
+            apart.append(path.stem.partition("-")[0].endswith("9"))
+    seen = torch.from_numpy(np.array(pictures)).to(device)
+    known, wanted = (torch.from_numpy(np.array(each, np.float32)).to(device) for each in (own, plan))
+    held_out = torch.from_numpy(np.array(apart)).to(device)
+    table, tests = (held_out == 0).nonzero()[:, 0], held_out.nonzero()[:, 0]
+    network = Network(plans.shape[1]).to(device)
+    optimizer = torch.optim.AdamW(network.parameters(), 1e-3, weight_decay=1e-3)
 
-    def loss_of(batch: torch.Tensor, place: tuple[int, int]) -> torch.Tensor:
-        top, left = place
-        looked = seen[batch[:, :2], :, :, top : top + CROP, left : left + CROP].float() / 255
+    def loss_of(batch: torch.Tensor) -> torch.Tensor:
         with torch.autocast(device, torch.bfloat16):
-            guess = network(looked, own[batch[:, :2]])
-        return (guess.float() - acts[batch[:, 2:]]).abs().mean()
+            guess = network(seen[batch].float() / 255, known[batch])
+        return (guess.float() - wanted[batch]).abs().mean()
 
-    while time.time() < end:
-        share = (time.time() - begun) / (end - begun)
-        for group in optimizer.param_groups:
-            group["lr"] = 3e-4 * 0.5 * (1 + np.cos(np.pi * min(1.0, share)))
-        place = tuple(np.random.default_rng(step).integers(0, SIZE - CROP + 1, 2).tolist())
-        loss = loss_of(table[torch.randint(len(table), (256,), device=device)], place)
+    rate = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, int(steps))
+    for step in range(1, int(steps) + 1):
+        loss = loss_of(table[torch.randint(len(table), (64,), device=device)])
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
-        step += 1
-        if step % 500 == 0:
-            network.eval()
+        rate.step()
+        if step % 250 == 0:
             with torch.no_grad():
-                middle = ((SIZE - CROP) // 2,) * 2
-                apart = np.mean([float(loss_of(part, middle)) for part in tests.split(256)])
-            network.train()
-            print(f"step {step}: loss {float(loss.detach()):.4f}, held out {apart:.4f}", flush=True)
-    pose_scale = torch.from_numpy(np.stack([mean, spread]))
-    torch.save(
-        {"network": network.state_dict(), "pose": pose_scale, "actions": acts.shape[1], "look": str(ROOM)}, weights
-    )
-    print(f"{step} steps on {len(rows)} rows in {weights}")
+                missed = np.mean([float(loss_of(part)) for part in tests.split(64)])
+            print(f"step {step}: loss {float(loss.detach()):.4f}, held out {missed:.4f}", flush=True)
+    told = {"own": torch.from_numpy(own_scale), "plan": torch.from_numpy(plan_scale), "look": str(ROOM)}
+    torch.save({"network": network.state_dict(), **told, "rows": max(len(film["pose"]) for film in found)}, weights)
+    print(f"{steps} steps on {len(table)} looks in {weights}")
 
 
 class Policy:
-    """The trained network, played in chunks."""
+    """The trained network, played from one look to the next."""
 
     def __init__(self, weights: str):
         torch.set_num_threads(1)
         self.device = "cuda" if torch.cuda.is_available() else "cpu"
         stored = torch.load(weights, map_location=self.device, weights_only=True)
-        self.network = Network(stored["actions"]).to(self.device).eval()
+        self.own, self.plan = (stored[name].cpu().numpy() for name in ("own", "plan"))
+        self.network = Network(self.plan.shape[1]).to(self.device).eval()
         self.network.load_state_dict(stored["network"])
-        self.mean, self.spread = stored["pose"].cpu().numpy()
-        self.look = stored["look"]
+        self.look, self.last = stored["look"], stored["rows"]
         self.version = f"{Path(weights).stat().st_size} {Path(weights).stat().st_mtime_ns}"
 
     def reset(self, observation, info, seed) -> None:
         """Start an episode."""
-        self.before, self.queue = None, []
+        self.rows, self.queue = 0, []
 
     def act(self, observation) -> np.ndarray:
-        """The next action of the chunk; a new chunk after `PLAYED` of them."""
-        if len(self.queue) <= 1:
-            now = self._seen(observation)
-            before, self.before = self.before or now, now
+        """The next action of the plan, with a pull to where the hand should be; no motion once demonstrations end."""
+        if self.rows == self.last:
+            return self.still
+        pose = np.concatenate([np.ravel(observation[name]) for name in POSE])
         if not self.queue:
-            pictures, pose = (
-                torch.from_numpy(np.stack(pair)).to(self.device)[None] for pair in zip(before, now, strict=True)
-            )
+            pictures = np.stack([observation[name] for name in CAMERAS]).transpose(0, 3, 1, 2)
+            own = np.array([*((pose - self.own[0]) / self.own[1]), self.rows / LONG], np.float32)
             with torch.no_grad():
-                self.queue = list(self.network(pictures, pose)[0, :PLAYED].float().cpu().numpy())
-        return np.clip(self.queue.pop(0), -1.0, 1.0)
+                seen = torch.from_numpy(np.ascontiguousarray(pictures)).to(self.device)[None].float() / 255
+                plan = self.network(seen, torch.from_numpy(own).to(self.device)[None])[0].cpu().numpy()
+            self.queue = list(plan * self.plan[1] + self.plan[0])
+        self.rows += 1
+        action, hand = np.split(self.queue.pop(0), [-HAND])
+        action[:3] += PULL * (hand[:3] - pose[:3]) / STEP
+        action[3:6] += PULL * turned(pose[3:HAND], hand[3:]) / TURN
+        action[6] = np.sign(action[6])
+        self.still = np.array([*[0.0] * 6, action[6]], np.float32)
+        return np.clip(action, -1.0, 1.0).astype(np.float32)
 
     def looks(self) -> bool:
-        """Whether the next `act` uses pictures: it gives a new chunk, or the next one does."""
-        return len(self.queue) <= 1
+        """Whether the next `act` uses pictures: it makes a new plan."""
+        return not self.queue and self.rows < self.last
 
-    def _seen(self, observation) -> tuple[np.ndarray, np.ndarray]:
-        margin = (SIZE - CROP) // 2
-        pictures = np.stack([observation[name] for name in CAMERAS])[:, margin : margin + CROP, margin : margin + CROP]
-        pose = np.concatenate([np.ravel(observation[name]) for name in POSE])
-        return (
-            np.ascontiguousarray(pictures.transpose(0, 3, 1, 2), np.float32) / 255,
-            ((pose - self.mean) / self.spread).astype(np.float32),
-        )
+
+def turned(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """The small rotation vector from one orientation to another [rad], of quaternions with the real part last."""
+    other = other / np.linalg.norm(other)
+    vector = one[3] * other[:3] - other[3] * one[:3] - np.cross(other[:3], one[:3])
+    return 2.0 * vector * np.sign(one @ other)
 
 
 def make_policy(env) -> Policy:
