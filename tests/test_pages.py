@@ -13,7 +13,7 @@ from scengen.site import task_page
 
 ROOT = build_docs.ROOT
 PAGES = [path for pattern in build_docs.WRITTEN for path in sorted(ROOT.glob(pattern))]
-MOST_WORDS = 28_740
+MOST_WORDS = 28_850
 """Number of words that docs/ may hold but for the generated page: people write them, and have to keep them true."""
 
 

@@ -226,7 +226,8 @@ def find_policy(name: str, memory: Library | None = None, client: ClientSettings
             "wss://HOST:PORT",
             "zmq://HOST:PORT",
         ]
-        raise UnknownName("policy", name, known)
+        meant = f"{name.removesuffix('.py')}:FACTORY" if name.endswith(".py") else None
+        raise UnknownName("policy", name, known, meant)
     return factory_of("policy", name)
 
 

@@ -61,6 +61,7 @@ def check_there(folder: Path, mark: str, maker: str) -> None:
     else:
         why = f"{mark} is missing; see scengen {maker}"
     there = [path for path in folder.parent.glob("*/") if path != folder and marks(path)]
-    close = [path for path in there if nearest(folder.name, [path.name])]
+    within = [path for path in sorted(folder.glob("*/")) if (path / mark).is_file()]
+    close = within or [path for path in there if nearest(folder.name, [path.name])]
     alike = f" (did you mean {str(close[0])!r}?)" if close else ""
     raise PoolError(f"no {MARKS[mark].removeprefix('a ')} at {folder}{alike}: {why}")

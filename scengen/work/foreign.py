@@ -46,7 +46,8 @@ def factory_of(setting: str, name: str) -> Callable[..., Any]:
         found = getattr(importlib.import_module(module), factory, None)
     except ModuleNotFoundError as error:
         if error.name and module.startswith(error.name):
-            what = f"there is no module {module!r} on the path or in this folder"
+            meant = f" (did you mean '{module.removesuffix('.py')}:{factory}'?)" if module.endswith(".py") else ""
+            what = f"there is no module {module!r} on the path or in this folder{meant}"
             raise BadConfig(f"{setting} = {cut(name)}; {what}") from None
         raise at_fault(setting, name, "its module cannot be imported", error) from error
     except Exception as error:

@@ -177,6 +177,8 @@ def test_a_policy_of_ones_own_is_found_in_the_working_directory(tmp_path, monkey
     [
         (("policy=orakel",), "did you mean 'oracle'"),
         (("policy=nowhere:Policy",), "there is no module 'nowhere'"),
+        (("policy=mine.py:Policy",), "did you mean 'mine:Policy'?"),
+        (("policy=mine.py",), "did you mean 'mine:FACTORY'?"),
         (("policy=math:sinus",), "math has no function or class named 'sinus'"),
         (("policy=idle", "seeds=7"), "holds 6 scenarios; pass seeds=6"),
         (("policy=idle", "rollouts=0"), "rollouts = 0; it must be at least 1"),

@@ -1,6 +1,8 @@
 """A package adds kinds of its own, with strengths for an effect that there is or with an effect of its own."""
 
+import re
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,6 +68,22 @@ def test_a_file_adds_a_kind_to_every_command_and_environment(package, tmp_path, 
         PoolEnv("domino_single", REFERENCE, ["force_torque"], perturb="raised@1")
     argv = ["evaluate", "policy=idle", f"pool={REFERENCE}", "seeds=1", "rollouts=1", f"to={tmp_path / 'table'}"]
     assert cli.run([*argv, "perturb=raised@3"]) == 0 and "raised@3" in capsys.readouterr().out
+
+
+def test_the_kind_of_the_page_works_as_written(package):
+    page = (Path(__file__).parents[2] / "docs" / "perturb.md").read_text().partition("## A kind of your own")[2]
+    file, code = (re.search(rf"```{language}\n(.*?)```", page, re.S)[1] for language in ("yaml", "python"))
+    (package.parents[1] / "dusty.py").write_text(code)
+    (package / "dust.yaml").write_text(file)
+    (package / "grains.yaml").write_text(file.replace("effect: blur ", "effect: lab_kinds.dusty:dust "))
+    assert kinds()["dust"].effect is kinds()["blur"].effect
+    seen = []
+    for perturb in (None, "grains@5"):
+        env = PoolEnv("domino_single", REFERENCE, ["rgb_exo_right_cam"], width=64, height=64, perturb=perturb)
+        seen.append(env.reset(seed=0)[0]["rgb_exo_right_cam"])
+        env.close()
+    changed = (seen[0] != seen[1]).any(axis=2)
+    assert 0.02 < changed.mean() < 0.08 and (seen[1][changed] == 0).all()
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,8 @@ def mine(made, tmp_path):
 
 
 def test_a_pool_holds_the_first_certified_indices_in_order(made):
+    with pytest.raises(PoolError, match=f"did you mean '{made}'"):
+        Pool.open(made.parent)
     rows = list(Pool.open(made))
     assert [r.index for r in rows] == [0, 1, 2]
     assert all(r.certificate.complete and r.split == "id" and r.axes == () and r.shifted == {} for r in rows)
