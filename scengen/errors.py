@@ -14,7 +14,17 @@ from typing import Any
 
 
 class ScengenError(Exception):
-    """Base class of every error that scengen raises on purpose."""
+    """Base class of every error that scengen raises on purpose. Its message, class and attributes survive pickling."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (type(self), self.args, self.__dict__)
+
+
+def _restored(kind: type[ScengenError], args: tuple[Any, ...], state: Mapping[str, Any]) -> ScengenError:
+    """An error as it was, without its constructor, which makes the message of other arguments."""
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(state)
+    return error
 
 
 class BadConfig(ScengenError):

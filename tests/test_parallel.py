@@ -3,6 +3,7 @@
 import errno
 import math
 import os
+import pickle
 import resource
 import shlex
 import signal
@@ -17,10 +18,10 @@ from faults import lost, work
 
 from scengen.cli.commands.settings import read
 from scengen.cli.commands.verify import VerifySettings
-from scengen.errors import BadConfig
+from scengen.errors import BadConfig, Infeasible, NoEvent, NoOracle, OutOfBounds, UnknownName
 from scengen.work import machine
 from scengen.work.machine import cores
-from scengen.work.parallel import Limits, WorkerDied, each
+from scengen.work.parallel import Limits, WorkerDied, each, portable
 
 LIMITS = Limits(0.5, 200)
 ROOT = Path(__file__).parents[1]
@@ -78,6 +79,24 @@ def test_an_error_comes_through_and_a_death_without_a_name_for_it_is_an_error():
         list(each(work, ["error"], 1, LIMITS))
     with pytest.raises(WorkerDied, match="SIGSEGV"):
         list(each(work, ["crash"], 1, LIMITS))
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        UnknownName("task", "dominos", ["domino_single"]),
+        OutOfBounds("x", 3.0, 0.0, 1.0, "m"),
+        Infeasible("the draw", 3, {"too far": 3}),
+        NoEvent("a push"),
+        NoOracle("PushOff"),
+        BadConfig("n = 0"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_an_error_of_scengen_comes_through_as_it_was(error):
+    kind, found = pickle.loads(portable(error))
+    assert kind == "error" and type(found) is type(error) and str(found) == str(error)
+    assert vars(found).items() >= vars(error).items()
 
 
 def test_a_worker_killed_from_outside_changes_no_result(tmp_path):

@@ -18,7 +18,7 @@ from functools import cache, partial
 from pathlib import Path
 
 from .. import compose
-from ..errors import Infeasible, ScengenError
+from ..errors import Infeasible, NoOracle, ScengenError
 from ..ood import axis_card, axis_evidence, features
 from ..ood.baseline import BELIEF
 from ..params import canonical, values, with_values
@@ -97,6 +97,7 @@ def checks(
     return [
         Rule("the file states what policies may know", partial(_describes_axes, found)),
         Rule("the family states its version", partial(_states_version, found, search(conf))),
+        Rule("the family has an oracle", partial(_has_an_oracle, found)),
         *of_splits,
     ]
 
@@ -111,6 +112,7 @@ def at_sight(task: str, overrides: Sequence[str] = ()) -> list[str]:
     for rule in (
         partial(_describes_axes, found),
         partial(_states_version, found, task_files.search_path(overrides)),
+        partial(_has_an_oracle, found),
         partial(_scenes_have_controls, found, ID, 1, 0),
     ):
         try:
@@ -197,6 +199,11 @@ def _states_version(task: Task, search: Sequence[str]) -> None:
     read, where = task_files.version(task.name, search), f"{task.family.__name__} of {task.name}"
     stated = "VERSION" in vars(task.family) and read == task.version
     _require(stated, f"{where} has version {task.version}; state it in the class: VERSION = {task.version}")
+
+
+def _has_an_oracle(task: Task) -> None:
+    """The family has a scripted solution, without which nothing is certified."""
+    _require(task.family.oracle is not Scenario.oracle, str(NoOracle(task.family.__name__)))
 
 
 def _draws_are_keyed(task: Task, split: str, scenarios: int, seed: int) -> None:

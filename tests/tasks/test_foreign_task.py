@@ -13,7 +13,7 @@ from scengen.envs.gym import PoolEnv
 from scengen.errors import BadConfig, UnknownName
 from scengen.samplers import task_files
 from scengen.samplers.dists import Fixed
-from scengen.scenario import Shortcut
+from scengen.scenario import Scenario, Shortcut
 
 CONF = Path(__file__).parents[1] / "foreign" / "conf"
 SEARCH = conformance.search(CONF)
@@ -73,6 +73,14 @@ def test_a_version_that_is_not_in_the_class_itself_is_caught(monkeypatch):
     monkeypatch.setattr(PushBlock, "VERSION", 2)
     with pytest.raises(Nonconformity, match="has version 2; state it in the class"):
         rules._states_version(load_task("push_block", SEARCH), SEARCH)
+
+
+def test_a_task_without_an_oracle_is_told_at_sight(monkeypatch):
+    assert not rules.at_sight("push_block", SEARCH)
+    monkeypatch.setattr(PushBlock, "oracle", Scenario.oracle)
+    assert rules.at_sight("push_block", SEARCH) == [
+        "PushBlock has no oracle; write its method oracle(world), see CONTRIBUTING.md"
+    ]
 
 
 @pytest.mark.parametrize("version", [0, -1, True, "2", 1.0])
