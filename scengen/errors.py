@@ -53,12 +53,13 @@ class UnknownName(ScengenError):
         close = f" (did you mean {meant!r}?)" if meant else nearest(name, names)
         also = "".join(f", nor {cut(repr(other))}{nearest(other, names)}" for other in others)
         remedy = f"; {REMEDIES[kind]}" if kind in REMEDIES else ""
-        listed = "" if close and len(names) > MANY else f"; known: {', '.join(names) or '(none)'}"
+        is_clear = close and all(nearest(other, names) for other in others)
+        listed = "" if is_clear and len(names) > MANY else f"; known: {', '.join(names) or '(none)'}"
         super().__init__(f"no {kind} named {cut(repr(name))}{close}{also}{remedy}{listed}")
 
 
 MANY = 24
-"""Number of known names above which a message that names the nearest one does not list them."""
+"""Number of known names above which a message does not list them, if it names the nearest one."""
 
 
 REMEDIES = {

@@ -71,6 +71,7 @@ class Proofs(Measurement):
                     faults[f"{name}@{level}"].append(f"it changes more than level {level - 1} in {ordered:.0%} only")
         value = {"faults": {cell: told for cell, told in faults.items() if told}, "changes": changes}
         words = f"{len(cells) - len(value['faults'])} of {len(cells)} cells are proved"
+        words += "".join(f"\n{cell} is not: {'; '.join(told)}" for cell, told in value["faults"].items())
         return Result(job, [Row(ID, self.options["n"], value)], words, not value["faults"])
 
 

@@ -339,8 +339,9 @@ def test_a_level_that_changes_no_more_than_the_one_before_is_found(monkeypatch):
     monkeypatch.setattr("scengen.measures.perturbations.perceived", lambda: {"noise": kind})
     monkeypatch.setattr("scengen.measures.perturbations.kinds", lambda: {"noise": kind})
     monkeypatch.setattr("scengen.perturb.perturbation.kinds", lambda: {"noise": kind})
-    found = Proofs({"n": 1}).result(Job(task, ("id",), {"n": 1})).rows[0].value["faults"]
-    assert found == {"noise@3": ["it changes more than level 2 in 0% only"]}
+    found = Proofs({"n": 1}).result(Job(task, ("id",), {"n": 1}))
+    assert found.rows[0].value["faults"] == {"noise@3": ["it changes more than level 2 in 0% only"]}
+    assert found.words == "4 of 5 cells are proved\nnoise@3 is not: it changes more than level 2 in 0% only"
 
 
 @drawing
