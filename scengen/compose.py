@@ -27,7 +27,7 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from .errors import SHOWN_LENGTH, BadConfig, ScengenError, UnknownName, cut
+from .errors import SHOWN_LENGTH, BadConfig, ScengenError, UnknownName, cut, shown
 from .samplers.split import ID
 from .samplers.task import Task, load
 from .samplers.task_files import (
@@ -37,6 +37,7 @@ from .samplers.task_files import (
     category,
     command_file,
     conf_dir,
+    file_of_group,
     groups,
     is_folder,
     packages,
@@ -82,7 +83,23 @@ def _loaded_once(name: str, others: tuple[str, ...]) -> Task:
 
 def _loaded(name: str, overrides: Sequence[str]) -> Task:
     plain, choices = composed("one_task", [f"task={name}", *overrides])
-    return load(choices["task"], plain["task"])
+    return task_of(choices["task"], plain["task"], overrides)
+
+
+def task_of(name: str, node: Mapping[str, Any], overrides: Sequence[str]) -> Task:
+    """Build a task from its composed file. An error in a file that does not come with scengen names the file.
+
+    Raises:
+        ScengenError: one line that says what is wrong.
+    """
+    try:
+        return load(name, node)
+    except ScengenError as error:
+        file = file_of_group(name, "task", overrides)
+        changed = any(re.match(r"[+~]*task\.", text) for text in overrides)
+        if file and not changed and not file.is_relative_to(conf_dir()):
+            error.args = (f"{shown(file)}: {error}",)
+        raise
 
 
 # --- settings of certificates -----------------------------------------------------------------
@@ -223,7 +240,7 @@ def as_yaml(verb: str, overrides: Sequence[str]) -> str:
     plain, choices = composed(verb, overrides)
     if {"certify", "task"} <= choices.keys():
         plain["certify"] = certify_node(
-            plain["certify"], load(choices["task"], plain["task"]), choices["certify"], verb, overrides
+            plain["certify"], task_of(choices["task"], plain["task"], overrides), choices["certify"], verb, overrides
         )
     flows = {key: None if isinstance(value, dict) else False for key, value in plain.items()}  # None: leaves in a line
     style = {"sort_keys": False, "allow_unicode": True, "width": 120}

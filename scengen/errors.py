@@ -163,17 +163,17 @@ def place_of(error: BaseException) -> str:
     if (place := getattr(error, PLACE, None)) is not None:
         return place
     if isinstance(error, SyntaxError) and error.filename and _is_foreign(error.filename, ""):
-        return f"{_shown(error.filename)}, line {error.lineno}"
+        return f"{shown(error.filename)}, line {error.lineno}"
     for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
         if _is_foreign(frame.f_code.co_filename, _package(frame)):
-            return f"{_shown(frame.f_code.co_filename)}, line {line}, in {frame.f_code.co_name}"
+            return f"{shown(frame.f_code.co_filename)}, line {line}, in {frame.f_code.co_name}"
     return ""
 
 
 def where_written(code: Callable[..., Any]) -> str:
     """The place of the first line of a function, such as `task.py, line 3, in build`."""
     written = inspect.unwrap(code).__code__
-    return f"{_shown(written.co_filename)}, line {written.co_firstlineno}, in {written.co_name}"
+    return f"{shown(written.co_filename)}, line {written.co_firstlineno}, in {written.co_name}"
 
 
 def _package(frame: FrameType) -> str:
@@ -202,7 +202,7 @@ def _builds_on_scengen(package: str) -> bool:
     return any(line.split(";")[0].strip().startswith("scengen") for line in required)
 
 
-def _shown(file: str) -> str:
+def shown(file: str | Path) -> str:
     """A file relative to the working directory if it is in it."""
     path = Path(file)
     return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)

@@ -14,6 +14,7 @@ import json
 import re
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache, partial
 from pathlib import Path
 
@@ -41,6 +42,8 @@ DRAWS = 10
 """Number of draws of each split that are compared in two orders."""
 TWINS = 12
 """Number of twins of each axis in which the moved parameters are looked for."""
+NEARLY = 0.75
+"""Least similarity of two names of which one may be a misspelt other (difflib): `meens` and `means` have 0.8."""
 SNAKE_CASE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 """Names of shortcuts, ablations and features, which users write on command lines and in lists with commas."""
 
@@ -98,6 +101,7 @@ def checks(
         Rule("the file states what policies may know", partial(_describes_axes, found)),
         Rule("the family states its version", partial(_states_version, found, search(conf))),
         Rule("the family has an oracle", partial(_has_an_oracle, found)),
+        Rule("the family spells its methods", partial(_spells_its_methods, found)),
         *of_splits,
     ]
 
@@ -113,6 +117,7 @@ def at_sight(task: str, overrides: Sequence[str] = ()) -> list[str]:
         partial(_describes_axes, found),
         partial(_states_version, found, task_files.search_path(overrides)),
         partial(_has_an_oracle, found),
+        partial(_spells_its_methods, found),
         partial(_scenes_have_controls, found, ID, 1, 0),
     ):
         try:
@@ -204,6 +209,15 @@ def _states_version(task: Task, search: Sequence[str]) -> None:
 def _has_an_oracle(task: Task) -> None:
     """The family has a scripted solution, without which nothing is certified."""
     _require(task.family.oracle is not Scenario.oracle, str(NoOracle(task.family.__name__)))
+
+
+def _spells_its_methods(task: Task) -> None:
+    """No method of the family nearly has the name of one that scengen calls, and that the family does not define."""
+    own = {name for kind in task.family.__mro__ if kind not in Scenario.__mro__ for name in vars(kind)}
+    called = [name for name, what in vars(Scenario).items() if callable(what) and name[0] != "_" and name not in own]
+    for name in sorted(own - {*vars(Scenario)}):
+        meant = get_close_matches(name, [each for each in called if each[0] == name[0]], 1, NEARLY)
+        _require(not meant, f"{task.family.__name__} has {name}, and scengen calls {''.join(meant)}; rename it")
 
 
 def _draws_are_keyed(task: Task, split: str, scenarios: int, seed: int) -> None:

@@ -107,6 +107,21 @@ def test_a_misspelt_base_of_a_task_file_is_named_with_the_file(tmp_path, capsys)
     assert told in capsys.readouterr().err
 
 
+def test_an_error_in_a_task_file_of_ones_own_names_the_file(tmp_path, capsys):
+    (tmp_path / "task").mkdir()
+    file = tmp_path / "task" / "mine.yaml"
+    file.write_text("defaults: [domino_single, _self_]\nid: {tile: {mas: [uniform, 0.03, 0.04]}}\n")
+    words = ["task=mine", f"hydra.searchpath={tmp_path}"]
+    for verb in ("tasks", "generate"):
+        assert cli.run([verb, *words]) == 2
+        assert (
+            f"{file}: no parameter in mine.id named 'tile.mas' (did you mean 'tile.mass'?)" in capsys.readouterr().err
+        )
+    file.write_text("defaults: [domino_single, _self_]\n")
+    assert cli.run(["generate", *words, "task.id.x=[uniform, 9, 10]"]) == 2
+    assert str(file) not in capsys.readouterr().err
+
+
 def test_an_experiment_without_a_folder_says_where_to_put_it(capsys):
     assert cli.run(["generate", DOMINO, "+experiment=heavy"]) == 2
     assert "give hydra.searchpath=FOLDER, the folder in which experiment/ is" in capsys.readouterr().err

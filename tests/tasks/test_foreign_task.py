@@ -83,6 +83,13 @@ def test_a_task_without_an_oracle_is_told_at_sight(monkeypatch):
     ]
 
 
+def test_a_misspelt_method_is_told_at_sight(monkeypatch):
+    monkeypatch.setattr(PushBlock, "oracles", PushBlock.oracle, raising=False)
+    assert not rules.at_sight("push_block", SEARCH), "both are there"
+    monkeypatch.setattr(PushBlock, "stebs", PushBlock.oracle, raising=False)
+    assert rules.at_sight("push_block", SEARCH) == ["PushBlock has stebs, and scengen calls steps; rename it"]
+
+
 @pytest.mark.parametrize("version", [0, -1, True, "2", 1.0])
 def test_a_version_that_is_no_number_from_one_on_is_refused(monkeypatch, version):
     monkeypatch.setattr(PushBlock, "VERSION", version)

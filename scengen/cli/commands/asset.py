@@ -78,6 +78,7 @@ def command(arguments: Arguments) -> int:
     if settings.name is not None:
         return _write_mesh(settings.name, Path(str(settings.to)))
     out.print(_table())
+    out.print(_classes())
     if settings.json:
         write_json(settings.json, {name: _plain(kind()) for name, kind in kits().items()})
     return OK
@@ -93,6 +94,13 @@ def _table() -> Table:
     for name, kind in kits().items():
         for i, p in enumerate(parameters(kind())):
             table.add_row("" if i else name, p.name, f"{p.nominal:g}", f"{p.low:g} to {p.high:g}", p.unit)
+    return table
+
+
+def _classes() -> Table:
+    table = Table("asset", "in a family")
+    for name, kind in kits().items():
+        table.add_row(name, f"from {kind.__module__} import {kind.__name__}")
     return table
 
 

@@ -4,9 +4,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from ...compose import certify_levels, certify_node, composed
+from ...compose import certify_levels, certify_node, composed, task_of
 from ...errors import BadConfig, cut
-from ...samplers.task import Task, load
+from ...samplers.task import Task
 from ...samplers.task_files import groups
 from ...validate.settings import CertifySettings
 from ...work.cluster import AUTO, Cluster
@@ -72,7 +72,7 @@ def _read_with_task(
 ) -> tuple[T, Task, Mapping[str, Any], Mapping[str, str]]:
     """Settings, task, all that was composed, and the names of the files that were chosen."""
     plain, choices = composed(verb, overrides)
-    return typed("", kind, _settings(verb, plain)), load(choices["task"], plain["task"]), plain, choices
+    return typed("", kind, _settings(verb, plain)), task_of(choices["task"], plain["task"], overrides), plain, choices
 
 
 def task_overrides(overrides: Sequence[str]) -> list[str]:
