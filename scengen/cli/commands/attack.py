@@ -55,6 +55,8 @@ def command(arguments: Arguments) -> int:
     names = {one.scenario.id: str(one.name) for one in subjects}
     for line in _remarks(report, names):
         say(line)
+    if fair := len(report.hits) - len(report.refuting):
+        say(f"{fair} hits have every contact of the oracle: they refute nothing, and show how easy the task is")
     for hit in report.refuting:
         warn(f"REFUTED {names[hit.scenario]} {hit}; {hit.name}.npz")
     above = list(report.above_limits(subjects[0].scenario.answer()))
