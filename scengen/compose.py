@@ -305,7 +305,7 @@ MAX_DIGITS = 4300
 """Number of digits of the longest number that Python reads."""
 MAX_DEPTH = 20
 """Largest nesting of lists and groups in an override: more than any file of conf/ needs."""
-LISTS = ("pool", "policy", "cameras", "mujoco", "apart", "data", "styles", "splits")
+LISTS = ("pool", "policy", "cameras", "mujoco", "apart", "data", "styles", "splits", "kinds")
 """Settings for which several values are a list and not a sweep. `keep` is always a list."""
 PATHS = (
     *("pool", "apart", "data", "to", "film", "json", "junit", "hit", "hits", "results", "records", "ycb", "mesh"),

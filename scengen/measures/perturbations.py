@@ -8,10 +8,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..errors import UnknownName
 from ..look.looks import ROOM
 from ..params import parameters
 from ..perturb.effects import LANGUAGE
-from ..perturb.kinds import LEVELS, kinds, perceived
+from ..perturb.kinds import LEVELS, Kind, kinds, perceived
 from ..perturb.language import Words
 from ..samplers.split import ID
 from ..samplers.task import Task
@@ -31,19 +32,32 @@ class Proofs(Measurement):
 
     A cell, a kind at a level, passes if in each scenario the physics is the same to the bit, each camera and stream
     that it affects differs, each body that clean pictures show stays in sight, and the level before changes less. Of
-    the changes of pictures the unit is that of `distance`.
+    the changes of pictures the unit is that of `distance`. With `kinds` only these are proved, and nothing is stored.
     """
 
     KIND = "perturb"
-    OPTIONS: ClassVar[Mapping[str, Any]] = {"n": 1}
+    OPTIONS: ClassVar[Mapping[str, Any]] = {"n": 1, "kinds": None}
 
     def all_splits(self, task: Task) -> Sequence[str]:
         return (ID,)
 
     def jobs(self, task: Task) -> Iterator[Job]:
         if self.chosen(task):
-            strengths = {name: list(kind.strengths) for name, kind in perceived().items()}
-            yield Job(task, (ID,), {**self.options, "strengths": strengths, "look": str(ROOM)})
+            strengths = {name: list(kind.strengths) for name, kind in self._wanted().items()}
+            yield Job(task, (ID,), {"n": self.options["n"], "strengths": strengths, "look": str(ROOM)})
+
+    def _wanted(self) -> Mapping[str, Kind]:
+        """The kinds to prove.
+
+        Raises:
+            UnknownName: a requested kind changes nothing that is perceived, or does not exist.
+        """
+        every, chosen = perceived(), self.options.get("kinds")
+        names = [*every] if chosen is None else [chosen] if isinstance(chosen, str) else chosen
+        for name in names:
+            if name not in every:
+                raise UnknownName("kind that changes what is perceived", name, every)
+        return {name: every[name] for name in names}
 
     def result(self, job: Job) -> Result:
         task = job.task
@@ -54,7 +68,7 @@ class Proofs(Measurement):
             played = run(scenario, world_of(scenario, task.embodiment), scenario.oracle, task.horizon)
             made = scenario, rebuild(scenario), task.embodiment, played.actions, words, secrets
             with closing(Stage(*made)) as stage:
-                for kind in (k for k in perceived().values() if not k.lacks(words)):
+                for kind in (k for k in self._wanted().values() if not k.lacks(words)):
                     for level in range(1, LEVELS + 1):
                         cells.setdefault((kind.name, level), []).append(stage.proof(kind, level))
         faults = {
@@ -72,7 +86,8 @@ class Proofs(Measurement):
         value = {"faults": {cell: told for cell, told in faults.items() if told}, "changes": changes}
         words = f"{len(cells) - len(value['faults'])} of {len(cells)} cells are proved"
         words += "".join(f"\n{cell} is not: {'; '.join(told)}" for cell, told in value["faults"].items())
-        return Result(job, [Row(ID, self.options["n"], value)], words, not value["faults"])
+        rows = [Row(ID, self.options["n"], value)] if self.options.get("kinds") is None else []
+        return Result(job, rows, words, not value["faults"])
 
 
 def _mean(proofs: Sequence[Proof]) -> float:

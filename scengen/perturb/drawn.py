@@ -1,6 +1,6 @@
 """What is drawn for a scenario, and how it is applied to the compiled scene, pictures, readings and the instruction."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import Loop
-from ..errors import BadConfig
+from ..errors import BadConfig, where_written
 from ..samplers.keyed import unit
 from .effects import OBJECTS, Effect, Picture, Reading, Values, number_in
 from .kinds import affects, kinds, stream_kind
@@ -109,7 +109,8 @@ class Drawn:
         for name, values in self.values.items():
             effect = self.effects[name]
             if effect.on_picture is not None and affects(effect, camera):
-                picture = effect.on_picture(picture, values, self._rng(name, camera, period))
+                found = effect.on_picture(picture, values, self._rng(name, camera, period))
+                picture = _as_before(name, effect.on_picture, found, picture)
         return picture
 
     def on_reading(self, stream: str, entries: Sequence[str], reading: Reading, period: int) -> Reading:
@@ -122,7 +123,8 @@ class Drawn:
         for name, values in self.values.items():
             effect = self.effects[name]
             if effect.on_reading is not None and stream_kind(stream) == effect.reads:
-                found = effect.on_reading(entries, reading, values, self._rng(name, stream, period))
+                changed = effect.on_reading(entries, reading, values, self._rng(name, stream, period))
+                found = _as_before(name, effect.on_reading, changed, reading)
                 reading = np.where(self._there(entries), found, reading) if effect.reads == OBJECTS else found
         return reading
 
@@ -169,6 +171,20 @@ class Senses:
 def _period(time: float) -> int:
     """Number of the control period at a time."""
     return round(time / Loop.PERIOD)
+
+
+def _as_before(name: str, function: Callable[..., Any], found: Any, given: NDArray[Any]) -> NDArray[Any]:
+    """What the function of a kind returns, of the shape and type that it was given.
+
+    Raises:
+        BadConfig: it is not.
+    """
+    if isinstance(found, np.ndarray) and (found.shape, found.dtype) == (given.shape, given.dtype):
+        return found
+    what = f"{found.dtype} of shape {found.shape}" if isinstance(found, np.ndarray) else type(found).__name__
+    wanted = f"{given.dtype} of shape {given.shape}"
+    place = f"{where_written(function)}: " if hasattr(function, "__code__") else ""
+    raise BadConfig(f"{place}perturbation {name} returned {what}, and must return {wanted}")
 
 
 def _unequal(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.int64]:

@@ -81,6 +81,8 @@ def _kind(path: Path, is_added: bool = False) -> Kind:
     """
     node = read_yaml("kind", path)
     needed = ("strengths", "unit", "why", "source", *(("effect",) if is_added else ()))
+    if odd := sorted(str(key) for key in node if key not in needed):
+        raise BadConfig(f"{path}: {UnknownName('key', odd[0], needed)}")
     try:
         strengths = tuple(float(each) for each in node["strengths"])
         texts = [str(node[key]) for key in needed[1:]]

@@ -415,7 +415,7 @@ def _family(name: str, path: Any) -> type[Scenario]:
         raise BadConfig(f"{name}.family = {cut(repr(path))}; expected package.module.Class")
     module, _, inner = path.rpartition(".")
     try:
-        family = getattr(importlib.import_module(module), inner)
+        found = importlib.import_module(module)
     except Exception as error:
         why = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
         if isinstance(error, ModuleNotFoundError) and error.name == module.partition(".")[0]:
@@ -423,6 +423,9 @@ def _family(name: str, path: Any) -> type[Scenario]:
         elif place := place_of(error):
             why += f", {place}"
         raise BadConfig(f"{name}.family = {cut(repr(path))} cannot be imported ({why})") from None
+    classes = [each for each, what in vars(found).items() if isinstance(what, type) and issubclass(what, Scenario)]
+    if (family := getattr(found, inner, None)) is None:
+        raise UnknownName(f"class in {module} ({name}.family)", inner, classes)
     if not (isinstance(family, type) and issubclass(family, Scenario)):
         raise BadConfig(f"{name}.family = {cut(repr(path))} is not a Scenario")
     version: object = family.VERSION

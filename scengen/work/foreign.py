@@ -64,4 +64,5 @@ def at_fault(setting: str, name: str, what: str, error: Exception) -> ForeignCod
     """The error for a fault of a user's code."""
     message = f"{type(error).__name__}: {cut(' '.join(str(error).split()))}"
     where = f", {place}" if (place := place_of(error)) else ""
-    return ForeignCode(f"{setting} = {cut(name)}; {what} ({message}{where}); the fault is the {setting}'s")
+    owner = setting.rpartition(": ")[2]
+    return ForeignCode(f"{setting} = {cut(name)}; {what} ({message}{where}); the fault is the {owner}'s")

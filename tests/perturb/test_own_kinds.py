@@ -26,6 +26,12 @@ def upward():
 def rise(entries, reading, values, rng):
     return reading + np.array([values["mm"] / 1000 if each.endswith("eef_pos.z") else 0.0 for each in entries])
 
+def flat():
+    return Effect(lambda strength, rng: {"mm": strength}, on_picture=flattened)
+
+def flattened(picture, values, rng):
+    return picture.mean(axis=2)
+
 def failing():
     raise ValueError("no")
 
@@ -86,6 +92,16 @@ def test_the_kind_of_the_page_works_as_written(package):
     assert 0.02 < changed.mean() < 0.08 and (seen[1][changed] == 0).all()
 
 
+def test_a_picture_of_another_shape_is_the_fault_of_its_function(package):
+    (package / "flat.yaml").write_text(FILE.format("lab_kinds.effects:flat"))
+    env = PoolEnv("domino_single", REFERENCE, ["rgb_exo_right_cam"], width=32, height=32, perturb="flat@5")
+    with pytest.raises(
+        BadConfig, match=r"effects.py, line \d+, in flattened: perturbation flat returned float64 of shape"
+    ):
+        env.reset(seed=0)
+    env.close()
+
+
 @pytest.mark.parametrize(
     ("name", "text", "error", "says"),
     [
@@ -100,6 +116,12 @@ def test_the_kind_of_the_page_works_as_written(package):
         ("fog", FILE.format("lab_kinds.effects:failing"), ScengenError, "its function fails"),
         ("fog", FILE.format("lab_kinds.effects:something"), BadConfig, "returned int, and must return an Effect"),
         ("fog", FILE.format("noise").replace("5]", "4]"), BadConfig, "give 5 growing positive numbers"),
+        (
+            "fog",
+            FILE.format("noise") + "strenghts: [1]\n",
+            BadConfig,
+            "no key named 'strenghts' .did you mean 'strengths'",
+        ),
         ("fog", "strengths: [1, 2, 3, 4, 5]", BadConfig, "give strengths, unit, why, source, effect"),
     ],
 )

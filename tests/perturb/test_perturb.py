@@ -341,6 +341,9 @@ def test_a_level_that_changes_no_more_than_the_one_before_is_found(monkeypatch):
     monkeypatch.setattr("scengen.perturb.perturbation.kinds", lambda: {"noise": kind})
     found = Proofs({"n": 1}).result(Job(task, ("id",), {"n": 1}))
     assert found.rows[0].value["faults"] == {"noise@3": ["it changes more than level 2 in 0% only"]}
+    assert found.rows and not Proofs({"n": 1, "kinds": "noise"}).result(Job(task, ("id",), {"n": 1})).rows
+    with pytest.raises(UnknownName, match="did you mean 'noise'"):
+        list(Proofs({"n": 1, "kinds": ["noisy"]}).jobs(task))
     assert found.words == "4 of 5 cells are proved\nnoise@3 is not: it changes more than level 2 in 0% only"
 
 

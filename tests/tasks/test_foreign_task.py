@@ -75,12 +75,12 @@ def test_a_version_that_is_not_in_the_class_itself_is_caught(monkeypatch):
         rules._states_version(load_task("push_block", SEARCH), SEARCH)
 
 
-def test_a_task_without_an_oracle_is_told_at_sight(monkeypatch):
+def test_a_task_without_an_oracle_is_told_at_sight(monkeypatch, capsys):
     assert not rules.at_sight("push_block", SEARCH)
     monkeypatch.setattr(PushBlock, "oracle", Scenario.oracle)
-    assert rules.at_sight("push_block", SEARCH) == [
-        "PushBlock has no oracle; write its method oracle(world), see CONTRIBUTING.md"
-    ]
+    told = "PushBlock has no oracle; write its method oracle(world), see CONTRIBUTING.md"
+    assert rules.at_sight("push_block", SEARCH) == [told]
+    assert cli.run(["tasks", "task=push_block", *SEARCH]) == 1 and told in capsys.readouterr().err
 
 
 def test_a_misspelt_method_is_told_at_sight(monkeypatch):

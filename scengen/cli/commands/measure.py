@@ -32,6 +32,7 @@ class MeasureSettings:
     wrong: int | None
     mujoco: str | list[str] | None
     compare: str | None
+    kinds: str | list[str] | None
     fresh: bool
     workers: int
     records: str | None

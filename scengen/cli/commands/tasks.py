@@ -14,7 +14,7 @@ from ...samplers.task import Task, leaves
 from ...samplers.task_files import about, search_path
 from ...work.targets import try_file
 from ..tables import axes_table, task_tables, tasks_table
-from . import OK, Arguments, out, remark, say, write_json
+from . import FAILED, OK, Arguments, out, remark, say, write_json
 from .settings import read
 
 PAPER = "paper"
@@ -46,7 +46,7 @@ def command(arguments: Arguments) -> int:
         write_json(settings.json, data)
     if settings.records is not None and not settings.axes:
         say(f"claimed, and not checked: the figures of {settings.records}; scengen measure fresh=true makes them again")
-    return OK
+    return FAILED if isinstance(data, dict) and data["refused"] else OK
 
 
 def _print(axes: str | None, name: str | None, category: str | None, arguments: Arguments) -> Any:
@@ -77,9 +77,10 @@ def _print(axes: str | None, name: str | None, category: str | None, arguments: 
         return [{"task": task.name, **_axis(task, axis)} for task, axis in of_paper]
     for table in (*task_tables(tasks[0]), evidence_table(tasks[0])):
         out.print(table)
-    for refused in conformance.at_sight(tasks[0].name, others):
-        remark(f"the rules for tasks refuse this: {refused} (scengen.conformance)")
-    return {**asdict(listed[0]), "horizon": tasks[0].horizon, "version": tasks[0].version, **_contents(tasks[0])}
+    for why in (refused := conformance.at_sight(tasks[0].name, others)):
+        remark(f"the rules for tasks refuse this: {why} (scengen.conformance)")
+    told = {"horizon": tasks[0].horizon, "version": tasks[0].version, "refused": refused}
+    return {**asdict(listed[0]), **told, **_contents(tasks[0])}
 
 
 def _contents(task: Task) -> dict[str, Any]:
