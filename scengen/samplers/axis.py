@@ -117,7 +117,8 @@ class Axis:
     def _dropped(self) -> str:
         """Remedy of last resort, for an axis of the task's file and for one that the command line adds."""
         name = self.name.partition("@")[0]
-        return f"drop the axis: out of the task's file (for one command ~task.axes.{name}), or no +task.axes.{name}"
+        here = f"~task.axes.{name} for one command, or leave +task.axes.{name} out"
+        return f"drop the axis from the task's file, with {here}"
 
     def _check_symmetries(
         self, training: Mapping[str, Dist], known: Mapping[str, Parameter], symmetries: Sequence[Symmetry]
