@@ -97,12 +97,16 @@ def checks(
         Rule(f"{split}: {_readable_name(check)}", partial(check, found, split, scenarios, seed))
         for split, check in wanted
     ]
+    return [*_written(found, search(conf)), *of_splits]
+
+
+def _written(task: Task, search: Sequence[str]) -> list[Rule]:
+    """The checks of a task's files alone."""
     return [
-        Rule("the file states what policies may know", partial(_describes_axes, found)),
-        Rule("the family states its version", partial(_states_version, found, search(conf))),
-        Rule("the family has an oracle", partial(_has_an_oracle, found)),
-        Rule("the family spells its methods", partial(_spells_its_methods, found)),
-        *of_splits,
+        Rule("the file states what policies may know", partial(_describes_axes, task)),
+        Rule("the family states its version", partial(_states_version, task, search)),
+        Rule("the family has an oracle", partial(_has_an_oracle, task)),
+        Rule("the family spells its methods", partial(_spells_its_methods, task)),
     ]
 
 
@@ -113,13 +117,8 @@ def at_sight(task: str, overrides: Sequence[str] = ()) -> list[str]:
         overrides: folders of other packages, and changes of the task.
     """
     found, said = compose.load_task(task, overrides), list[str]()
-    for rule in (
-        partial(_describes_axes, found),
-        partial(_states_version, found, task_files.search_path(overrides)),
-        partial(_has_an_oracle, found),
-        partial(_spells_its_methods, found),
-        partial(_scenes_have_controls, found, ID, 1, 0),
-    ):
+    written = _written(found, task_files.search_path(overrides))
+    for rule in (*written, partial(_scenes_have_controls, found, ID, 1, 0)):
         try:
             rule()
         except Nonconformity as error:

@@ -90,6 +90,11 @@ def test_a_misspelt_method_is_told_at_sight(monkeypatch):
     assert rules.at_sight("push_block", SEARCH) == ["PushBlock has stebs, and scengen calls steps; rename it"]
 
 
+def test_a_misspelt_class_of_a_family_is_told_with_the_nearest_one():
+    with pytest.raises(UnknownName, match=r"push_block.family\) named 'PushBlok' \(did you mean 'PushBlock'"):
+        load_task("push_block", [*SEARCH, "task.family=foreign.push_block.PushBlok"])
+
+
 @pytest.mark.parametrize("version", [0, -1, True, "2", 1.0])
 def test_a_version_that_is_no_number_from_one_on_is_refused(monkeypatch, version):
     monkeypatch.setattr(PushBlock, "VERSION", version)
